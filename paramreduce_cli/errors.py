@@ -126,7 +126,7 @@ class ArtifactError(ParamreduceError):
 
 
 class DataError(ParamreduceError):
-    """User-supplied data that do not fit the robot or cannot be used."""
+    """An error in user-supplied data that do not fit the robot or cannot be used."""
 
 
 class NumericalError(ParamreduceError):

@@ -45,7 +45,7 @@ def replace_atomically(path: Path) -> Iterator[Path]:
 
 
 def check_is_file(path: Path) -> None:
-    """Refuse what would be waited for, such as a pipe; a file that is not there is no matter.
+    """Raise ArtifactError if a path is a pipe or a folder; accept a path that does not exist.
 
     Raises:
         ArtifactError: It is not a file.

@@ -43,7 +43,7 @@ class RowChecks:
                 self._end_block()
 
     def write(self, data: h5py.Dataset) -> None:
-        """Keep them with what they are of."""
+        """Write the checksums as an attribute of the dataset."""
         if self._missing < self._rows:
             self._end_block()
         data.attrs[_ATTRIBUTE] = np.array(self._values, dtype=np.uint64)
@@ -56,7 +56,7 @@ class RowChecks:
 
 
 def write_checks(data: h5py.Dataset, array: np.ndarray) -> None:
-    """Keep checksums of an array with the dataset that holds it."""
+    """Write the checksums of an array as an attribute of its dataset."""
     checks = RowChecks(_count_row_bytes(array))
     checks.add(array)
     checks.write(data)

@@ -128,7 +128,7 @@ def _is_like_number(cell: str) -> bool:
 
 
 def _number(path: Path, line: int, heading: str, cell: str, *, empty: bool, text: bool) -> float:
-    """Read a cell; an empty one, or text, is not a number where it may stand, and an error elsewhere."""
+    """Return the number in a cell; an empty cell or text gives NaN where that is allowed, and an error elsewhere."""
     try:
         return float(cell)
     except ValueError as error:

@@ -200,7 +200,7 @@ class Writer:
         return append
 
     def finish(self) -> None:
-        """Write what waits for more rows."""
+        """Write the rows that were buffered."""
         for end in self._ends:
             end()
         self._check()
@@ -299,7 +299,7 @@ class Reader:
         return data
 
     def verify(self) -> None:
-        """Read all there is, and so have all checksums compared.
+        """Read the whole file, which compares all checksums.
 
         Raises:
             ArtifactError: Something is damaged.

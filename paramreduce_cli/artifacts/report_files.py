@@ -125,7 +125,7 @@ def list_newer_artifacts(results: Path) -> list[str]:
 
 
 def _is_whole(summary: Mapping[str, Any]) -> bool:
-    """Whether the digest fits; where there is no provenance, whether none stands under a damaged name either."""
+    """Return whether the digest fits; without provenance, whether no damaged key looks like one."""
     if "provenance" not in summary:
         return not any(isinstance(entry, dict) and "digest" in entry for entry in summary.values())
     stamp = _get_stamp(summary)

@@ -57,7 +57,7 @@ _GENERALISED = ("q", "dq", "ddq")
 
 
 def save_sample_set(writer: Writer, name: str, sample_set: SampleSet) -> None:
-    """Write one set; its triangular factors are collected on the way, unless they are known from its parts."""
+    """Write one set; compute its triangular factors unless the parts of the set have them."""
     known = sample_set.compute_factors() if isinstance(sample_set, JoinedSet) else None
     accumulator = FactorAccumulator()
     appenders: dict[str, Any] = {}
@@ -303,7 +303,7 @@ def load_samples(reader: Reader) -> Samples:
 
 
 def load_item_set(reader: Reader, name: str) -> StoredSet:
-    """Return a set that the project wrote by itself."""
+    """Return a set that the project wrote as an item."""
     return StoredSet(reader.path, name, _read_matrix_shape(reader, name)[1], owns_file=True)
 
 

@@ -93,7 +93,7 @@ class Store:
         return True
 
     def reject_replacement(self, record: type, robot: str) -> None:
-        """Keep what is not this robot's from being overwritten.
+        """Raise ArtifactError if a file of another robot would be overwritten.
 
         A damaged artifact may be replaced; a file of another robot, or one that paramreduce did
         not make, may not.

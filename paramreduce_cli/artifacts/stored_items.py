@@ -137,7 +137,7 @@ def _get_origin(stamp: Stamp) -> tuple[Any, ...]:
 
 
 def _save_record(writer: Writer, record: Any) -> None:
-    """Write an item as the kind of record that it is."""
+    """Write an item in the format of its type."""
     kind = type(record).__name__
     if record is None:
         writer.write_attribute(_KIND, _NOTHING)
@@ -153,7 +153,7 @@ def _save_record(writer: Writer, record: Any) -> None:
 
 
 def _load_record(reader: Reader) -> Any:
-    """Return an item as the kind of record that it is."""
+    """Return an item, read in the format of its type."""
     kind = reader.read_attribute(_KIND)
     if kind == _NOTHING:
         return None

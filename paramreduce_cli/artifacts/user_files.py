@@ -122,7 +122,7 @@ def load_recording(path: Path, n_dof: int) -> Recording:
 
 
 def _check_time(path: Path, time: FloatArray) -> None:
-    """Time goes on; it may begin anew, for another trajectory, but not time and again."""
+    """Raise DataError unless time rises; it may start again where another trajectory begins."""
     steps = np.diff(time)
     starts = np.concatenate([[-1], np.flatnonzero(steps < 0), [time.size - 1]])
     wrong = np.flatnonzero(steps == 0)

@@ -139,13 +139,13 @@ class _Commands(click.Group):
     def resolve_command(
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
-        """Return the command that is asked for, or raise an error that names the one that is meant."""
+        """Return the requested command, or raise an error that suggests a similar one."""
         if args and not args[0].startswith("-") and self.get_command(ctx, args[0]) is None:
             raise UnknownCommandError(args[0], self.list_commands(ctx), ctx)
         return super().resolve_command(ctx, args)
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """List them with what they do, read from their files."""
+        """Write the list of commands with their help, read from their files."""
         rooms = {name: room for room in (stages, commands) for name in room}
         with formatter.section("Commands"):
             formatter.write_dl(

@@ -41,7 +41,7 @@ class PartType(click.ParamType):
     name = "i/N"
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Part:
-        """Read it."""
+        """Return the part that a text such as 3/8 names."""
         try:
             return Part.parse(str(value))
         except ValueError as error:

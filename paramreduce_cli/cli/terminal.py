@@ -332,7 +332,7 @@ class _Lines:
         self._told: dict[str, float] = {}
 
     def show(self, p: Progress) -> None:
-        """Tell of a step, if it is time."""
+        """Print a step of progress if enough time has passed."""
         now = time.monotonic()
         begun = self._begun.setdefault(p.task, now)
         told_before = p.task in self._told

@@ -46,14 +46,14 @@ def make_exists_error(path: Path, config: Path | None = None) -> ConfigError:
 
 
 def copy_example(name: str, path: Path) -> tuple[list[Path], list[str]]:
-    """Copy a robot's config, and the files that it names beside it.
+    """Copy an example config and the files that it refers to.
 
     Args:
         name: Name of the robot.
         path: Destination of the config.
 
     Returns:
-        What is there now, the config first; and files that it names which do not come along.
+        Copied files, the config first; and names of files that it refers to but that are not part of the package.
 
     Raises:
         ConfigError: There is no such robot, or a file is there already.

@@ -76,7 +76,7 @@ def load_config(path: Path, overrides: Sequence[str] = ()) -> Config:
 
 
 def load_settings(path: Path | None, overrides: Sequence[str] = ()) -> Settings:
-    """Read what is asked of samples without any robot.
+    """Return the sections of a config that apply to samples without a robot.
 
     Args:
         path: A YAML without a description; None for defaults.

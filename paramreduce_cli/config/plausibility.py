@@ -25,7 +25,7 @@ _MOST = 6
 
 
 def find_implausible_bodies(config: Config) -> Iterator[str]:
-    """Yield a sentence for each kind of body whose mass does not go with its size, or its size with the robot's."""
+    """Yield a sentence for each kind of implausible body: its mass does not fit its size, or its size the robot's."""
     extent = _estimate_size(config)
     # Of a single joint nothing else tells a size.
     size = max(_SMALLEST, extent) if extent > 0 else np.inf

@@ -85,7 +85,7 @@ _TOO_DEEP = "it refers to itself, or is nested too deep"
 
 
 def _check_depth(text: str) -> None:
-    """Refuse deep nesting before nodes are made of it, which takes a level of the stack for each."""
+    """Raise an error for deeply nested YAML before it is parsed; parsing takes one stack level per nesting."""
     depth = 0
     for event in yaml.parse(text, _LOADER):
         if isinstance(event, yaml.CollectionStartEvent):

@@ -69,7 +69,7 @@ class Excitation:
     """Limits of torque and power."""
 
     def weigh_rows(self, q: FloatArray, dz: FloatArray, ddz: FloatArray) -> FloatArray:
-        """Return W with every row divided by its joint's torque scale, with smooth friction."""
+        """Return W with each row divided by its joint's torque scale, and with smoothed Coulomb friction."""
         W = self.observation.evaluate(q, dz, ddz)
         W *= self._row_weights(q.shape[0])
         return W

@@ -82,11 +82,11 @@ def _stop_inside(intermediate_result: "scipy.optimize.OptimizeResult") -> None:
 
 
 def shrink_to_feasible(free: FloatArray, still: FloatArray, objective: FreeObjective) -> FloatArray:
-    """Shrink a free series towards a resting position until it keeps the bounds.
+    """Shrink Fourier coefficients towards a resting position until the motion keeps the bounds.
 
     Args:
-        free: Free series, (n_dof, 1 + 2 harmonics).
-        still: Free series that rests inside all bounds.
+        free: Fourier coefficients before limits are applied, (n_dof, 1 + 2 harmonics).
+        still: Coefficients of a motion that rests inside all bounds.
         objective: Objective, which is NaN outside the bounds.
 
     Raises:

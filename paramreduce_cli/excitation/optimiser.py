@@ -232,7 +232,7 @@ class _Search:
         return _Grid(basis, limits)
 
     def draw_starts(self, seed: list[int]) -> list[_Candidate]:
-        """Return random series, each with its value of the first level's objective."""
+        """Return random Fourier series, each with its objective in the first step of the plan."""
         result = []
         for start in range(self._settings.starts * self.plan.drawn):
             free = self._draw_series(np.random.default_rng([*seed, start]))
@@ -267,7 +267,7 @@ class _Search:
             return np.inf
 
     def take_step(self, candidate: _Candidate, step: Step) -> int:
-        """Take a candidate through one step, the last one on all points, and return the iterations it took."""
+        """Optimise a candidate in place for one step of the plan, and return the number of iterations."""
         if step is not self.plan.steps[-1]:
             return self._minimise(candidate, step, self._coarse)
         iterations = 0

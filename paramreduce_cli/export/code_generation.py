@@ -174,7 +174,7 @@ def _describe_rounding(
 
 
 def _describe_frames(mechanism: Mechanism) -> tuple[str, ...]:
-    """Return the geometry of the config, line by line."""
+    """Return the table of joints and frames of the config, line by line, for the header of the code."""
     header, *rows = mechanism.table
     lines = Table(mechanism.frames, header, tuple(rows)).to_text().splitlines()
     return tuple(f"  {line}".rstrip() for line in lines if line)

@@ -131,7 +131,7 @@ def check(
 def check_against_mechanism(
     model: Model, stored: Mapping[str, FloatArray], least: Mapping[str, float]
 ) -> None:
-    """Compare the torques of a model without any reduction with those of all parameters of the robot.
+    """Compare the torques of the full model's code with those of all parameters of the robot.
 
     Args:
         model: The robot.

@@ -57,7 +57,7 @@ def write_robot_file(
 def _check_same(
     config: Config, source: SourceSection, robot: SimplifiedRobot, *, gravity: bool
 ) -> None:
-    """Refuse a file whose bodies and joints, or gravity, are no longer those of the config."""
+    """Raise ConfigError if bodies, joints or gravity of the file differ from those of the config."""
     if gravity and not np.allclose(config.description.gravity, robot.gravity, rtol=0, atol=_SAME):
         raise ConfigError(
             f"{source.file}: has another gravity than the config; change one of them."

@@ -103,7 +103,7 @@ class RunningModel:
 
 
 def measure_speeds(models: Mapping[str, RunningModel], states: Mapping[str, FloatArray]) -> Speed:
-    """Return how long models take on the same states, by the names of what :class:`RunningModel` takes."""
+    """Return the time per evaluation of several models on the same states."""
     # In turns, and the shortest: whatever else the machine does meets all of them alike.
     handed = {name: [states[key] for key in model.takes] for name, model in models.items()}
     turns = [

@@ -98,7 +98,7 @@ def _make_temporary_folder() -> tempfile.TemporaryDirectory[str]:
 
 
 def is_kept(library: Path) -> bool:
-    """Return whether a library is there and whole; a whole one counts as used, a damaged one is removed."""
+    """Return whether a library is complete in the cache; mark it as used, or remove it if it is damaged."""
     try:
         if library.exists() and not library.is_file():  # a pipe would be waited for
             library.unlink()
@@ -113,7 +113,7 @@ def is_kept(library: Path) -> bool:
 
 
 def keep(built: Path, library: Path) -> None:
-    """Put a library that was built beside it in its place, whole or not at all; old ones go.
+    """Move a new library into the cache atomically, and remove old ones.
 
     Raises:
         OSError: It cannot be written.

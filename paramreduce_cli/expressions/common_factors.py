@@ -27,7 +27,7 @@ from paramreduce_cli.expressions.rows import (
 
 @within
 def factor(rows: Rows) -> None:
-    """Take factors common to terms of a sum out of it, the most frequent first."""
+    """Factor sums: take factors that several terms share out of the sum, the most frequent first."""
     while True:
         n = take_next(rows, FACTOR)
         if n < 0:

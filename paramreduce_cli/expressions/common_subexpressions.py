@@ -46,7 +46,7 @@ def extract_common_pairs(rows: Rows, kind: int) -> None:
 
 @within
 def _find_most_shared(rows: Rows, n: int) -> tuple[int, int]:
-    """Return the places of the two terms of a row that most other rows of its kind have too; negative if none has."""
+    """Return the positions of the two terms of a row that most other rows of its kind share; negative if there are none."""
     counts = rows.pairs
     kind, length = rows.numbers[n, KIND], rows.numbers[n, LENGTH]
     shared = 0
@@ -91,8 +91,7 @@ def _find_most_shared(rows: Rows, n: int) -> tuple[int, int]:
 
 @within
 def _count_beside(rows: Rows, n: int, a: int, b: int, row: IntArray) -> tuple[int, int]:
-    """Return the number of terms that a row has beside a pair, and the sign with which it has the pair; negative
-    without the pair.
+    """Return the number of other terms in a row that contains a pair, and the pair's sign; negative without the pair.
 
     Args:
         rows: All of them.
@@ -119,7 +118,7 @@ def _count_beside(rows: Rows, n: int, a: int, b: int, row: IntArray) -> tuple[in
 
 @within
 def _compute_once(rows: Rows, kind: int, a: int, b: int) -> None:
-    """Make all rows of a kind refer to one row for a pair of terms, as far as there is space."""
+    """Replace a pair of terms in all rows of a kind by a reference to one new row, as long as there is space."""
     rarer = a if rows.numbers[a >> 1, USES] <= rows.numbers[b >> 1, USES] else b
     row, holders = rows.room[0], rows.room[1]
     found, shared, slot = 0, END, rows.numbers[rarer >> 1, HEAD]

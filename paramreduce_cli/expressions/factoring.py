@@ -65,7 +65,7 @@ class Values(NamedTuple):
         return make_rows(tables["+"], tables["*"], pinned, len(nodes), calls)
 
     def from_rows(self, rows: Rows) -> "Values":
-        """Return the same values in a graph of their own.
+        """Return the values of rows in a new graph.
 
         Args:
             rows: Rows from :meth:`to_rows`, possibly rewritten.
@@ -152,7 +152,7 @@ class _Assembly:
         return terms or self._source.nodes[number].operands
 
     def _build_number(self, number: int) -> int:
-        """Build the node or row of a number, and return its value."""
+        """Build the node of a number, and return its reference."""
         graph = self._target
         if number in self._sums:
             return _join_pairwise(self._get_built(self._sums[number]), graph.add)
@@ -169,7 +169,7 @@ class _Assembly:
 
 
 def _join_pairwise(values: list[int], join: Callable[[int, int], int]) -> int:
-    """Join terms pairwise, so that few wait for others."""
+    """Add or multiply terms in a balanced tree, which shortens the chain of dependencies."""
     while len(values) > 1:
         pairs = [join(a, b) for a, b in zip(values[::2], values[1::2], strict=False)]
         values = pairs + values[len(pairs) * 2 :]

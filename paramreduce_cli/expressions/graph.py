@@ -45,7 +45,7 @@ class Graph:
         self.constant(0.0)
 
     def _append(self, node: Node) -> int:
-        """Append a node; return its value."""
+        """Append a node, and return its reference."""
         self.nodes.append(node)
         return 2 * len(self.nodes) - 2
 
@@ -74,7 +74,7 @@ class Graph:
         return value
 
     def number(self, value: int) -> float | None:
-        """Return what a constant is, None for anything else."""
+        """Return the value of a constant, None for other nodes."""
         number = self._numbers.get(value >> 1)
         return -number if number is not None and value & 1 else number
 

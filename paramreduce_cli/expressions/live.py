@@ -36,7 +36,7 @@ class LiveCount:
         self._outputs = np.array([value >> 1 for value in program.outputs], dtype=np.int64)
 
     def __call__(self, zero: BoolArray) -> int:
-        """Operations left.
+        """Return the number of operations that are left.
 
         Args:
             zero: Mask of the first inputs that are zero.

@@ -141,7 +141,7 @@ def wait(rows: Rows, which: int, number: int) -> None:
 
 @within
 def take_next(rows: Rows, which: int) -> int:
-    """Take the last number off a worklist; negative if it is empty, or if something has failed."""
+    """Return and remove the last number of a worklist; negative if it is empty, or after a failure."""
     if rows.counters[WAITING + which] == 0 or rows.counters[FAILED]:
         return END
     rows.counters[WAITING + which] -= 1
@@ -203,7 +203,7 @@ def _cancel(row: IntArray) -> int:
 
 @on_rows
 def put(rows: Rows, number: int, kind: int, row: IntArray) -> None:
-    """Give a number another row; it fails where the row is too long.
+    """Replace the row of a number; fails if the row is too long.
 
     Args:
         rows: All of them.
@@ -260,7 +260,7 @@ def add_row(rows: Rows, kind: int, row: IntArray) -> int:
 
 @on_rows
 def keep(rows: Rows) -> None:
-    """Make this what :func:`undo` returns to."""
+    """Save the current rows as the state that :func:`undo` restores."""
     for k in range(rows.counters[SAVED]):
         rows.numbers[rows.saved[k, NUMBER], IS_SAVED] = False
     rows.counters[SAVED] = 0
@@ -268,7 +268,7 @@ def keep(rows: Rows) -> None:
 
 @within
 def undo(rows: Rows) -> None:
-    """Return to what was kept; nothing waits then."""
+    """Restore the rows that :func:`keep` saved, and clear the worklists."""
     for k in range(rows.counters[SAVED]):
         row = rows.saved_terms[k, : rows.saved[k, LENGTH]]
         _replace(rows, rows.saved[k, NUMBER], rows.saved[k, KIND], row)

@@ -65,7 +65,7 @@ class _Rescaler:
         ]
 
     def build(self) -> Program:
-        """Return the program in its units."""
+        """Return the program in the new units."""
         for k, node in enumerate(self._program.nodes):
             self._values.append(self._build_node(k, node))
         return Program.from_graph(self._graph, [self._get_value(v) for v in self._program.outputs])
@@ -76,7 +76,7 @@ class _Rescaler:
         return self._graph.negate(found) if value & 1 else found
 
     def _build_node(self, k: int, node: Node) -> int:
-        """Return node k in its unit."""
+        """Build node k in its new unit."""
         operation, operands, number = node
         if operation == "constant":
             return self._graph.constant(number)
@@ -97,7 +97,7 @@ class _Rescaler:
         return self._graph.call(operation, *moved)
 
     def _make_constant(self, number: float) -> int:
-        """Return a number, or the known number from which it differs by rounding."""
+        """Return the node of a constant; numbers that differ only by rounding share a node."""
         size = abs(number)
         same = (one for one in self._numbers if abs(one - size) <= _ROUNDING * size)
         known = next(same, None)
@@ -137,7 +137,7 @@ class _Units:
         return -node.number if value & 1 else node.number
 
     def compute_factor(self, k: int) -> float:
-        """Return how many times its original value a node has."""
+        """Return the factor between a node's new and its original value."""
         return float(np.exp(self._s[k, -1]))
 
     def eliminate_products(self) -> None:

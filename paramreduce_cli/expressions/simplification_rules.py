@@ -58,7 +58,7 @@ def simplify_to_fixed_point(rows: Rows, products_first: bool) -> None:
 
 @within
 def tidy(rows: Rows) -> None:
-    """Drop rows that nothing uses, and take those that one other row uses into it where both are sums, or products."""
+    """Remove unused rows, and merge a row that only one row of the same kind uses into that row."""
     width = rows.terms.shape[1]
     while True:
         n = take_next(rows, TIDY)
@@ -102,7 +102,7 @@ def _resolve(rows: Rows, n: int) -> None:
 
 @within
 def insert(rows: Rows, holder: int, place: int) -> None:
-    """Put the terms of what is at a place of a row there instead."""
+    """Replace a term of a row by the terms of the row that it refers to."""
     kind, value = rows.numbers[holder, KIND], rows.terms[holder, place]
     held = value >> 1
     row, length = rows.room[0], 0

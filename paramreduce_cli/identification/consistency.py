@@ -50,7 +50,7 @@ class Physical:
 def list_constraints(
     mechanism: Mechanism, known_values: FloatArray, factor: FloatArray
 ) -> Physical:
-    """Return which parameters of a mechanism must be physical, and what is known of them.
+    """Return which parameters of a mechanism must be physical, and their known values.
 
     Args:
         mechanism: The robot.

@@ -11,7 +11,7 @@ _BESIDE = 4
 
 
 def unwrap_positions(z: FloatArray) -> tuple[int, ...]:
-    """Add whole turns where positions jump by them, in place.
+    """Make positions continuous in place by adding whole revolutions where they jump.
 
     A step counts as a whole turn where the positions before and after it go on as if it were not there.
 

@@ -61,7 +61,9 @@ def _iterate_stretches(motions: MeasuredMotions, k: int, every: int) -> Iterator
 
 
 def _find_runs(motions: MeasuredMotions) -> tuple[IntArray, IntArray, IntArray]:
-    """Return where samples of another piece or fold begin, with the end; and pieces and folds there."""
+    """Split samples into runs of constant piece and fold: return the start of each run and the end, and the piece and
+    fold of each run.
+    """
     total = motions.time.size
     starts, pieces, folds = [0], [], []
     for begin in range(0, total, _LOOKED_AT):

@@ -103,7 +103,7 @@ _Stretches = Sequence[tuple[int, int]]
 def _follow_stretches(
     stretches: _Stretches, reachable: Callable[[int, int], bool], soon: Callable[[int, int], bool]
 ) -> Iterator[tuple[int, int, _Stretches]]:
-    """Yield the row that is left, the one that is gone on with, and the stretches between them."""
+    """Yield the row before a cut, the row after it, and the stretches between them."""
     last, k = stretches[0][1], 1
     while k < len(stretches):
         found = k

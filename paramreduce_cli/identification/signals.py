@@ -152,7 +152,7 @@ def _read_matrix(
     times: str,
     left_out: Collection[str],
 ) -> FloatArray:
-    """Return the columns of a quantity, one for each joint, or raise DataError if some are missing."""
+    """Return the columns of a quantity, (n_rows, n_dof); raise DataError if columns are missing."""
     n_dof = len(joints)
     if isinstance(names, str):
         if NUMBER in names and names.replace(NUMBER, str(n_dof + 1)) in log.columns:

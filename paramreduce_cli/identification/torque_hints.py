@@ -26,7 +26,7 @@ _NEAR = 0.1
 
 
 def hint_at_unit(expected: FloatArray, ratios: FloatArray) -> list[str]:
-    """Return a hint if the bodies' torques are those of the config's values except for a large factor.
+    """Return a hint if measured torques are the config's torques times a large factor.
 
     Args:
         expected: Torques of the bodies with the values in the config, (n_samples, n_dof).

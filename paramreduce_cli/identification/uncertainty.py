@@ -58,7 +58,7 @@ def estimate_autocovariance(segments: Sequence[FloatArray]) -> FloatArray:
 
 
 def add_lost_noise(seen: FloatArray, lost: FloatArray) -> FloatArray:
-    """Return autocovariances with the noise added that a fit has taken out, as far as they stay positive definite.
+    """Return autocovariances corrected for the noise that the fit absorbs, as far as they stay positive definite.
 
     Args:
         seen: Autocovariances of residuals, (n_lags,).

@@ -388,7 +388,7 @@ class MjcfReader:
         return float(self._model.qpos0[self._model.jnt_qposadr[k]])
 
     def _warn_of_losses(self) -> None:
-        """Note what the file has and the config cannot have."""
+        """Note features of the file that a config cannot express."""
         model = self._model
         left = {
             "tendons": model.ntendon,

@@ -120,7 +120,7 @@ class SimplifiedRobot:
 
 
 def simplify_robot(robot: ImportedRobot, choice: SourceSection) -> SimplifiedRobot:
-    """Merge what does not move, and name everything as configs allow.
+    """Merge links that cannot move against each other, and give everything names that configs allow.
 
     Raises:
         ConfigError: A name that is asked for is not there, or nothing moves.

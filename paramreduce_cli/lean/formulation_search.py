@@ -188,7 +188,7 @@ def _renumber_columns(rigid: Rigid, positions: Mapping[int, int]) -> Rigid:
 
 
 def _make_signature(tree: Tree) -> tuple:
-    """Return a key that is equal for trees with equal counts."""
+    """Return a key for the cache; trees with the same key need the same number of operations."""
 
     def of(joint: Joint) -> tuple:
         placed = (joint.place.tobytes(), joint.turn.tobytes())

@@ -64,7 +64,7 @@ class FrameMotion:
 
 @cache_expressions
 def make_frame_motion(omega: Vector, rate: Vector) -> FrameMotion:
-    """Return the motion of a frame from its rates alone."""
+    """Return the motion of a frame from its angular velocity and acceleration, including U."""
     products = (omega[1] * omega[2], omega[0] * omega[2], omega[0] * omega[1])
     xx, yy, zz = (component * component for component in omega)
     (yz, xz, xy), (x, y, z) = products, rate

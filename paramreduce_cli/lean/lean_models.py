@@ -121,7 +121,7 @@ class LeanModels:
         formulations: tuple[Formulation, ...],
         project: Callable[[Mechanism, Graph, Sequence[int]], list[int]],
     ) -> _Variants:
-        """Return the programs of all formulations, with the parameters that are always dropped as zero."""
+        """Return one program per formulation, with parameters that no reduced model keeps set to zero."""
         programs = []
         for formulation in formulations:
             graph = Graph()

@@ -129,7 +129,7 @@ class PathPlanner:
         return []
 
     def _sample_poses(self, position: FloatArray, other: FloatArray) -> Iterator[FloatArray]:
-        """Yield clear poses, the same at every call: around the middle, and ever farther away."""
+        """Yield collision-free poses, the same at every call: first near the midpoint of two poses, then farther away."""
         rng = np.random.default_rng(0)
         limits = self._limits
         for k in range(_POSES):

@@ -173,7 +173,7 @@ class ObservationFunction:
     def compute_vector_jacobian_product(
         self, q: FloatArray, dz: FloatArray, ddz: FloatArray, W_bar: FloatArray
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Pull a derivative with respect to W back to the independent coordinates.
+        """Return the derivative with respect to the independent coordinates from that with respect to W.
 
         The derivative by z is taken through the position problem: dq/dz = R.
 

@@ -93,7 +93,7 @@ class ObservedSet:
         return map(self.at, self.spans)
 
     def iterate_pieces(self) -> Iterator[ObservedSet]:
-        """Yield the set as trajectories, long ones in pieces where the set is divisible."""
+        """Yield the set in pieces of limited size."""
         most = PIECE_SAMPLES // BLOCK_SAMPLES if self.divisible else len(self.spans)
         for _, own in itertools.groupby(self.spans, lambda span: span.trajectory):
             rest = list(own)

@@ -9,7 +9,7 @@ from paramreduce_cli.records import Block, FloatArray, Progress, ProgressCallbac
 def add_progress(
     blocks: Iterable[Block], n_samples: int, what: str, report_progress: ProgressCallback
 ) -> Iterator[Block]:
-    """Blocks as they are, with an audience that hears how far the reading has come."""
+    """Yield blocks unchanged, and report the progress of the reading."""
     done = 0
     for block in blocks:
         yield block
@@ -18,7 +18,7 @@ def add_progress(
 
 
 @dataclass(frozen=True)
-class ToldSet:
+class ProgressSet:
     """A sample set whose samples are computed as they are read, with an audience."""
 
     computed: SampleSet
@@ -27,7 +27,7 @@ class ToldSet:
 
     @property
     def n_samples(self) -> int:
-        """How many samples it yields in all."""
+        """Number of samples in all."""
         return self.computed.n_samples
 
     @property
@@ -40,5 +40,5 @@ class ToldSet:
         return add_progress(self.computed.iterate_blocks(), self.n_samples, self.what, self.tell)
 
     def compute_factors(self) -> FloatArray:
-        """Triangular factors of [W | tau] per trajectory and joint."""
+        """Return the triangular factors of [W | tau] per trajectory and joint."""
         return self.computed.compute_factors()

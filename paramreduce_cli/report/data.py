@@ -148,7 +148,7 @@ def find_first_motion(
     Args:
         blocks: Blocks of the set.
         model: Reduced model.
-        most: Samples from which on every second, fourth, ... one is taken.
+        most: Largest number of samples; longer trajectories are decimated by 2, 4, ... until they fit.
     """
     parts: list[Block] = []
     every, seen = 1, 0

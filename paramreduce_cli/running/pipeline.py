@@ -191,7 +191,7 @@ def _is_recorded(config: Config) -> bool:
 
 
 def check_is_part(stage: Stage, config: Config) -> None:
-    """Refuse a stage that has nothing to work on, before others are run for it.
+    """Raise ConfigError if the config has no work for a stage, before other stages run for it.
 
     Raises:
         ConfigError: The config names no log, or no measured torques.

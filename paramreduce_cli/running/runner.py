@@ -154,7 +154,7 @@ class Runner:
         path = self.store.get_path(stage.output)
         self._cut_short = False
         self.store.reject_replacement(stage.output, self._robot)
-        self._look_at_inputs(stage)
+        self._check_inputs(stage)
         previous = self._load_previous(stage)
         better = go_on and getattr(previous, "unfinished", False)
         if not force and not better and self.is_current(stage):
@@ -285,7 +285,7 @@ class Runner:
         return self._load_artifact(entry, inputs)
 
     def _load_artifact(self, entry: StageInput, inputs: Inputs) -> Any:
-        """Return an artifact, and note its digest; None if it is optional and not expected."""
+        """Return an artifact, and note its digest; None if it is optional and this config does not make it."""
         brought = self.samples if entry.type is Samples else None
         path = brought or self.store.get_path(entry.type)
         if entry.optional and not self._is_expected(entry.type):
@@ -315,8 +315,8 @@ class Runner:
             return self.config.robot
         return self.store.folder.resolve().name
 
-    def _look_at_inputs(self, stage: Stage) -> None:
-        """Refuse inputs of another layout; say which ones, or what these were made from, do not fit."""
+    def _check_inputs(self, stage: Stage) -> None:
+        """Raise an error for inputs of another layout; warn of inputs that were made with other settings."""
         for record in self._list_upstream(stage):
             if text := self.describe_mismatch(record):
                 run = f"`paramreduce run {self.asked}`".replace(" `", "`")
@@ -334,7 +334,8 @@ class Runner:
         return list(records)
 
     def describe_mismatch(self, record: type) -> str:
-        """Return from what else a record's file was made than the config and the files here; empty if from these.
+        """Describe how a record's file differs from what the config and the files here would give; empty if it does
+        not.
 
         Raises:
             ArtifactError: The file is of another layout.

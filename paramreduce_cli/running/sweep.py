@@ -101,7 +101,7 @@ class SweepRun:
         return list_stages_to_run(self.config)
 
     def divides(self, stage: Stage) -> bool:
-        """Whether a stage of it can be done as several jobs."""
+        """Return whether a stage of the run can be split into jobs."""
         if stage.output is Samples and self.config.sampling.log is not None:
             return False
         if stage.output is Reduction and PROVING not in self.config.reduction.heuristics:
@@ -220,7 +220,7 @@ def load_sweep(path: Path) -> Sweep:
 
 
 def _check_config(path: Path, run: SweepRun) -> None:
-    """Refuse a config that cannot be used, and say what of the list it is.
+    """Raise ConfigError for a config that cannot be used, with its place in the list.
 
     Raises:
         ConfigError: So it is.

@@ -84,7 +84,7 @@ def build_model(robot: Robot, model: ModelSection, run: Run) -> Model:
 def _say_other_modes(
     robot: Robot, model: ModelSection, mechanism: Mechanism, base: BaseParameters
 ) -> None:
-    """Say where the loops can be assembled in another way that has another number of base parameters.
+    """Warn if the loops have another assembly mode with another number of base parameters.
 
     A guess that leads to the wrong one of them is seen by this alone.
     """
@@ -113,7 +113,7 @@ def _say_other_modes(
 
 
 def _check_named(model: ModelSection, mechanism: Mechanism, base: BaseParameters) -> None:
-    """Refuse named base columns that are no base parameters, instead of replacing them."""
+    """Raise ConfigError if a column that the config names cannot be a base parameter."""
     names = mechanism.parameter_names
     for name in model.base_columns or []:
         if names.index(name) not in base.columns:

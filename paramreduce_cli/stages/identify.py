@@ -84,7 +84,7 @@ def identify(
 
 
 def _make_expansion(chosen: ReducedModel) -> FloatArray:
-    """Return the standard parameters by those of a model, (n_standard, n)."""
+    """Return the matrix that maps a model's parameters to standard parameters, (n_standard, n)."""
     columns = np.zeros((chosen.position.size, chosen.n))
     columns[chosen.kept, chosen.position[chosen.kept]] = 1.0
     return columns

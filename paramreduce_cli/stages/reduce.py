@@ -224,7 +224,7 @@ def _make_criterion_inputs(
 
 
 def _warn_of_open_proofs(proofs: Proofs | None) -> None:
-    """Say what is not proven."""
+    """Warn of sizes that are not proven."""
     if proofs is None or proofs.n_proven == proofs.n_provable:
         return
     counts = {status: proofs.status.count(status) for status in ProofStatus}

@@ -35,7 +35,7 @@ from paramreduce_cli.multibody.observation import (
     compute_standard_deviation,
     make_spans,
 )
-from paramreduce_cli.multibody.progress_samples import ToldSet
+from paramreduce_cli.multibody.progress_samples import ProgressSet
 from paramreduce_cli.multibody.quantities import Quantities
 from paramreduce_cli.records import (
     SETS,
@@ -106,14 +106,16 @@ def sample(
     stored = _combine_items(computed, items, report_progress)
     if stored is not None:
         return _make_samples(sampling, model, stored["estimation"], stored)
-    told = {name: ToldSet(one, f"{name} set", report_progress) for name, one in computed.items()}
+    told = {
+        name: ProgressSet(one, f"{name} set", report_progress) for name, one in computed.items()
+    }
     return _make_samples(sampling, model, computed["estimation"], told)
 
 
 def _combine_items(
     computed: Mapping[str, ComputedSet], items: Items, report_progress: ProgressCallback
 ) -> dict[str, JoinedSet] | None:
-    """Return the sets as their items, all of them kept; None where no item is kept and none has to be.
+    """Return the sets joined from their items; None if there are none.
 
     Raises:
         PartFinished: This job does only a part of the items, and that is done.
@@ -220,7 +222,7 @@ def _sample_series(
         make_spans([points] * (len(series) + len(motions))),
         _chain_states(
             len(series),
-            _series_states(series, trajectories.period, points, finer),
+            _iterate_states(series, trajectories.period, points, finer),
             evaluate_along(motions, points, finer),
         ),
         dynamics,
@@ -331,7 +333,7 @@ def _read_motion_states(motions: list[SimulatedMotion]) -> StatesAt:
 
 
 def _compute_measured_torques(model: Model, source: str, tau: FloatArray) -> FloatArray:
-    """Recorded torques, zero where none are measured."""
+    """Return recorded torques, zero where none are measured."""
     wanted = np.isfinite(model.nominal_torque)
     for j in np.flatnonzero(wanted & np.isnan(tau).any(axis=0)).tolist():
         lost = np.flatnonzero(np.isnan(tau[:, j]))
@@ -348,8 +350,8 @@ def _compute_measured_torques(model: Model, source: str, tau: FloatArray) -> Flo
     return np.where(wanted, tau, 0.0)
 
 
-def _series_states(series: list[FloatArray], period: float, points: int, finer: int) -> StatesAt:
-    """States of every series, with positions on a finer grid on which loops are followed."""
+def _iterate_states(series: list[FloatArray], period: float, points: int, finer: int) -> StatesAt:
+    """Return the states of every series, with positions on a finer grid on which loops are followed."""
     times, finer_times = sample_times(period, points), sample_times(period, finer * points)
 
     @lru_cache

@@ -189,7 +189,7 @@ def _check_without_model(judging: ValidationSection, section: SelectedSection) -
 
 
 def _reject_test_limits(judging: ValidationSection) -> None:
-    """Refuse limits of errors on a set that is not there.
+    """Raise ConfigError for limits on a test set if there is none.
 
     Raises:
         ConfigError: There is such a limit.

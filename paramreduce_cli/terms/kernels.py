@@ -53,7 +53,7 @@ def find_live_nodes(program: Instructions, pruning: Pruning) -> BoolArray:
 
 @inline
 def _multiply(factor: float, values: FloatArray, result: FloatArray) -> None:
-    """Write a vector times a factor; assigning it as a whole takes Numba seconds to compile, as shapes are compared."""
+    """Write a vector times a factor; a loop, because assigning whole arrays takes Numba seconds to compile."""
     for i in range(result.size):
         result[i] = factor * values[i]
 
@@ -222,7 +222,7 @@ def compute_effects(
     kept_values: FloatArray,
     adjoints: FloatArray,
 ) -> FloatArray:
-    """Return what terms contribute to quantities, (n_candidates, n_quantities n_samples)."""
+    """Return the contribution of each term to the quantities, (n_candidates, n_quantities * n_samples)."""
     operands = program.operands
     kept, source, factor = pruning
     _, quantities, m = adjoints.shape
@@ -372,7 +372,7 @@ def count_operations(program: Instructions, pruning: Pruning) -> int:
 
 @compile_loop()
 def count_flipped(program: Instructions, pruning: Pruning, candidates: IntArray) -> IntArray:
-    """Return the number of operations left with one more term the other way round, (n_candidates,)."""
+    """Return the number of operations left after flipping each candidate, (n_candidates,)."""
     kept, source, factor = pruning
     result = np.empty(candidates.shape[0], dtype=np.int64)
     changed, sources = kept.copy(), source.copy()

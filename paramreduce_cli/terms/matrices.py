@@ -96,7 +96,7 @@ def compute_whitening(gram: FloatArray, ridge: float) -> FloatArray:
 
 @compile_loop(within=True)
 def _factorise(matrix: FloatArray, lower: FloatArray) -> bool:
-    """Write the lower triangle by Cholesky, and return whether there is one."""
+    """Write the lower Cholesky factor, and return whether the matrix is positive definite."""
     n = matrix.shape[0]
     for i in range(n):
         least = _SINGULAR * matrix[i, i]

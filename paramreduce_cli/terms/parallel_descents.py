@@ -17,7 +17,7 @@ from paramreduce_cli.resources.processes import Item, WorkerPool, start_workers
 from paramreduce_cli.terms.descent import Descent, SearchHistory, continue_on_samples
 from paramreduce_cli.terms.fit_samples import TermSamples
 from paramreduce_cli.terms.program_fitting import Budget, Fitting
-from paramreduce_cli.terms.starts import Start, near
+from paramreduce_cli.terms.starts import Start, vary_start
 from paramreduce_cli.terms.tape import Tape
 from paramreduce_cli.terms.term_removal import NOISE, TermSearch
 
@@ -86,7 +86,7 @@ class Searcher:
         budget. The function is the same at first, but at the edge of the budget rounding may decide.
         """
         rng = np.random.default_rng([self.seed, what.turn])
-        start = near(what.start, what.others, self.lean, rng, direct=self.direct)
+        start = vary_start(what.start, what.others, self.lean, rng, direct=self.direct)
         return _descend(self.start_descent(start, what.turn), rng)
 
     def repeat_descent(self, what: Again) -> SearchHistory | None:
@@ -152,7 +152,9 @@ class WorkerGroup:
         *,
         however_late: bool = False,
     ) -> list[SearchHistory]:
-        """Return the results of items in their order: of the first item at least, and of others that start in time."""
+        """Return the results of items in their order: of the first item at least, and of others that start before the
+        deadline.
+        """
         in_time = partial(_work_in_time, work, math.inf if however_late else self._deadline)
         found: dict[int, SearchHistory] = {}
         for (number, _), (begun, way) in self._pool.map_unordered(in_time, enumerate(items)):

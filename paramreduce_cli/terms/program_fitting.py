@@ -251,7 +251,7 @@ class Fitting:
         return self.tape.get_outputs(values)
 
     def compute_effects(self, fit: TermFit, candidates: IntArray) -> FloatArray:
-        """Return what the rows of a fit lose with each term, (n_candidates, n_rows)."""
+        """Return the change of the rows of a fit when each term is removed, (n_candidates, n_rows)."""
         values, own, adjoints = self._differentiate(fit)
         found = self.tape.estimate_effects(fit.pruning, candidates, values, own, adjoints)
         return self._weigh(found.reshape(-1, *self.samples.tau.shape), fit.linear.metric)
@@ -269,7 +269,9 @@ class Fitting:
         return ways.add_ones(constants[itself[constants]]), values, pulls
 
     def _differentiate(self, fit: TermFit) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return values of nodes, values without pruning, and derivatives of the torques by nodes."""
+        """Return the values of nodes in the pruned program, the values they would have unpruned, and the derivatives of
+        the torques by nodes.
+        """
         inputs, everywhere = (
             self._stack_inputs(fit.beta, self.samples),
             np.ones(self.tape.size, np.bool_),

@@ -44,13 +44,15 @@ class Pruning(NamedTuple):
         return cls(np.ones((size, 3), dtype=np.bool_), np.arange(size), np.ones(size))
 
     def has(self, terms: IntArray) -> BoolArray:
-        """Return which terms, as :meth:`Tape.list_candidates` gives them, are as in the whole program."""
+        """Return a mask of terms that are neither removed nor replaced; terms are as in :meth:`Tape.list_candidates`."""
         nodes, what = terms.T
         kept: BoolArray = self.kept[nodes, np.minimum(what, WHOLE)]
         return np.where(what == ITSELF, self.source[nodes] == nodes, kept)
 
     def flip(self, terms: IntArray) -> Pruning:
-        """Return the pruning in which some terms are the other way round; replaced nodes can only become themselves."""
+        """Return the pruning with some terms flipped: removed terms return, present ones go; replaced nodes become
+        themselves.
+        """
         kept, source, factor = self.kept.copy(), self.source.copy(), self.factor.copy()
         own = terms[:, 1] == ITSELF
         kept[tuple(terms[~own].T)] ^= True

@@ -92,7 +92,7 @@ def order_by_estimate(starts: list[Start], smallest: int) -> Iterator[Start]:
     return (start for start in chain(*zip_longest(*near, *far)) if start is not None)
 
 
-def near(
+def vary_start(
     start: Start,
     others: Sequence[Start],
     lean: LeanModels,
@@ -100,7 +100,7 @@ def near(
     *,
     direct: bool,
 ) -> Start:
-    """A start like another one, its formulation varied, sometimes its subset another one too.
+    """Return a start near another one: its formulation is varied, and sometimes its subset replaced.
 
     Which formulation takes the fewest operations once terms are left out cannot be told before.
 

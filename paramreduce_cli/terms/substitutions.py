@@ -42,7 +42,9 @@ class Substitutions:
         return int(self.nodes[which]), int(self.sources[which]), float(self.factors[which])
 
     def estimate_changes(self, values: FloatArray, pulls: FloatArray) -> FloatArray:
-        """Return what rows lose, to first order, (n_ways, n_rows); for arguments see :func:`find_substitutions`."""
+        """Return the change of the rows by each substitution, to first order, (n_ways, n_rows); for arguments see
+        :func:`find_substitutions`.
+        """
         stand_in = np.where(
             (self.sources == NUMBER)[:, None],
             self.factors[:, None],

@@ -1,7 +1,7 @@
 import numpy as np
 from selecting import blocks_of
 
-from paramreduce_cli.multibody.progress_samples import ToldSet
+from paramreduce_cli.multibody.progress_samples import ProgressSet
 
 
 class Computed:
@@ -17,7 +17,7 @@ class Computed:
 
 def test_samples_pass_unchanged_and_are_counted():
     steps = []
-    told = ToldSet(Computed(), "estimation set", steps.append)
+    told = ProgressSet(Computed(), "estimation set", steps.append)
     for a, b in zip(told.iterate_blocks(), Computed().iterate_blocks(), strict=True):
         assert np.array_equal(a.W, b.W)
         assert np.array_equal(a.tau, b.tau)

@@ -8,7 +8,7 @@ from conftest import model_of
 
 from paramreduce_cli.lean.lean_models import LeanModels
 from paramreduce_cli.reduction.models import make_base_model
-from paramreduce_cli.terms.starts import Start, near, order_by_estimate
+from paramreduce_cli.terms.starts import Start, order_by_estimate, vary_start
 
 
 def start(n, cost, error):
@@ -43,7 +43,7 @@ def test_starts_near_one_are_the_same_function_written_otherwise(direct):
 
     expected, formulations, at = outputs(one), [], one
     for seed in range(8):
-        at = near(at, [one, at], lean, np.random.default_rng(seed), direct=direct)
+        at = vary_start(at, [one, at], lean, np.random.default_rng(seed), direct=direct)
         formulations.append(at.formulation)
         assert outputs(at) == pytest.approx(expected, rel=1e-9, abs=1e-9)
     assert formulations[-1] != lean.choose_formulation(base, direct=direct)
@@ -55,7 +55,7 @@ def test_another_subset_may_take_the_place_of_one():
     lean, base = LeanModels(model), make_base_model(model)
     one, other = (Start(name, base, 0.0, 0) for name in ("one", "other"))
     found = [
-        near(one, [other], lean, np.random.default_rng(seed), direct=False).heuristic
+        vary_start(one, [other], lean, np.random.default_rng(seed), direct=False).heuristic
         for seed in range(30)
     ]
     assert 0 < found.count("other") < found.count("one")

@@ -113,7 +113,7 @@ def run(
 
 
 def _warn_of_open_tasks(config: Path) -> None:
-    """Say where a template is not filled in yet; of a pipe there is nothing left to read."""
+    """Warn if a config still has TODO marks; skip pipes, which can be read only once."""
     if not config.is_file():
         return
     lines = config.read_text(encoding="utf-8", errors="replace").splitlines()
@@ -127,7 +127,7 @@ def _warn_of_open_tasks(config: Path) -> None:
 
 
 def _say_what_is_replaced(runner: Runner, *, changed: bool) -> None:
-    """Say whose results are replaced, where they are of another config, or of one that --set changes."""
+    """Warn if results of another config, or of other --set options, will be replaced."""
     assert runner.config is not None
     others = [s for s in list_stages_to_run(runner.config) if runner.is_of_other_config(s)]
     if not others:

@@ -245,7 +245,9 @@ def _refit(
 def _exclude_dependent(
     tableau: FloatArray, counters: IntArray, j: int, null_fraction: float
 ) -> None:
-    """Move a column's part to the others along the null space: the fit stays the same."""
+    """Exclude column j, which depends on the others: shift its coefficient to them along the null space, so the fit
+    stays the same.
+    """
     n, row = tableau.shape[1], tableau.shape[0] - 1
     free, nullity, start = counters[FREE], counters[NULLITY], 2 * n
     along = np.zeros(free)
