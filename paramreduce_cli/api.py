@@ -336,7 +336,7 @@ def run(
     words = format_arguments(Path(config), None if results is None else Path(results), overrides)
     with store.lock():
         for stage in list_stages_to_run(loaded):
-            Runner(loaded, store, jobs, Callbacks(progress), asked=words).run(stage)
+            Runner(loaded, store, jobs, Callbacks(progress), arguments=words).run(stage)
     return Results(store.folder)
 
 

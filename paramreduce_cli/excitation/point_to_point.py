@@ -62,7 +62,9 @@ def evaluate_along(motions: Sequence[PointToPoint], points: int, finer: int) -> 
         between = times[0] + step * np.arange(finer * times.size)
         way = evaluate_point_to_point(motion, np.minimum(between, motion.duration))[0]
         states = evaluate_point_to_point(motion, times)
-        return StateBlock(span.trajectory, times, *states, way=way if finer > 1 else None)
+        return StateBlock(
+            span.trajectory, times, *states, fine_positions=way if finer > 1 else None
+        )
 
     return at
 

@@ -41,7 +41,7 @@ State = tuple[FloatArray, ...]
 """Position, speed and acceleration of all joints, (n_dof,) each."""
 
 
-class _NoWayError(DataError):
+class _NoPathError(DataError):
     """A straight way is none."""
 
 
@@ -93,7 +93,7 @@ class PathPlanner:
         """
         try:
             return [self._plan_straight(start, end)]
-        except _NoWayError as error:
+        except _NoPathError as error:
             standing = all(self._can_stand(state[0]) for state in (start, end))
             found = self._plan_detour(start, end) if standing else []
             if not found:
@@ -121,7 +121,7 @@ class PathPlanner:
                     continue
                 try:
                     clear[one, other] = self._plan_straight(states[one], states[other])
-                except _NoWayError:
+                except _NoPathError:
                     lengths[one, other] = lengths[other, one] = np.inf
                     break
             else:
@@ -156,13 +156,13 @@ class PathPlanner:
             if self._is_inside(z) and slow.all():
                 name = self._find_violated_bound(z)
                 if name is not None:
-                    raise _NoWayError(
+                    raise _NoPathError(
                         "the move from trajectories.start_pose to the trajectory violates the bounds of {name}; choose another pose."
                     )
                 if self._is_loadable(z, dz, ddz):
                     return way
             duration *= _LONGER
-        raise _NoWayError(
+        raise _NoPathError(
             "no move from trajectories.start_pose to the trajectory keeps the limits; choose another "
             "pose within the position limits, or trajectories.rest_to_rest."
         )

@@ -40,7 +40,7 @@ class StateBlock:
     dz: FloatArray
     ddz: FloatArray
     tau: FloatArray | None = None
-    way: FloatArray | None = None
+    fine_positions: FloatArray | None = None
     """Positions z on a grid several times finer, on which loops are followed, (m n_samples, n_dof)."""
 
 
@@ -135,7 +135,7 @@ class ObservedSet:
         """Return the generalised coordinates of a block, and time and position of its end, to continue from there."""
         if self.dynamics.mechanism.loops is None:
             return s.z, before
-        way = s.z if s.way is None else s.way
+        way = s.z if s.fine_positions is None else s.fine_positions
         finer = way.shape[0] // s.z.shape[0]
         steps = np.arange(way.shape[0]) / finer
         time = np.interp(steps, np.arange(s.time.size), s.time)

@@ -45,7 +45,7 @@ class Provenance:
     seconds: Mapping[str, float]
     warnings: Mapping[str, Sequence[str]]
     """Warnings of the config and of the stages, by name."""
-    asked: str
+    arguments: str
     """The config and options that name the run at the shell; empty where it was not started there."""
     settings: Mapping[str, Any]
     """Settings of the config that differ from their defaults."""

@@ -62,7 +62,7 @@ def render_page(
     environment.filters["percent"] = format_percent
     model = data.model
     loops = model is not None and model.mechanism.loops is not None
-    context = {"s": summary, "loops": loops, "answer": gather_answer(data, provenance.asked)}
+    context = {"s": summary, "loops": loops, "answer": gather_answer(data, provenance.arguments)}
     items = _group_items(images, made)
     sections = [
         {

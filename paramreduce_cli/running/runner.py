@@ -133,7 +133,7 @@ class Runner:
     callbacks: Callbacks = Callbacks()
     samples: Path | None = None
     settings: Settings | None = None
-    asked: str = ""
+    arguments: str = ""
     _cut_short: bool = field(default=False, init=False)
     """Whether Ctrl-C has ended a search of the stage at hand."""
 
@@ -305,7 +305,7 @@ class Runner:
     @property
     def config_name(self) -> str:
         """Name of the config's file; empty where the run was not started with one at the shell."""
-        words = shlex.split(self.asked) if self.config is not None else []
+        words = shlex.split(self.arguments) if self.config is not None else []
         return Path(words[0]).name if words else ""
 
     @property
@@ -319,7 +319,7 @@ class Runner:
         """Raise an error for inputs of another layout; warn of inputs that were made with other settings."""
         for record in self._list_upstream(stage):
             if text := self.describe_mismatch(record):
-                run = f"`paramreduce run {self.asked}`".replace(" `", "`")
+                run = f"`paramreduce run {self.arguments}`".replace(" `", "`")
                 again = f"{run} rebuilds it" if self.config is not None else "make it again"
                 self.callbacks.warn(f"{text}; {again}")
 
@@ -401,4 +401,4 @@ class Runner:
                 seconds[stage.name] = stamp.seconds
                 warnings[stage.name] = stamp.warnings
         wanted = self.config or self.settings or Settings()
-        return make_provenance(wanted, self._robot, seconds, warnings, self.asked)
+        return make_provenance(wanted, self._robot, seconds, warnings, self.arguments)

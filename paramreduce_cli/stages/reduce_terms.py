@@ -139,7 +139,7 @@ def _search(task: _Task, name: str) -> TermModel | None:
     if found.cut_short:
         _warn_of_time_limit(name)
     fitted = judge.decimate(samples.estimation, _FITTED)
-    way = [Judged.judge(one.refit(fitted, budget), judge, budget) for one in found.front]
+    way = [EvaluatedProgram.judge(one.refit(fitted, budget), judge, budget) for one in found.front]
     ends = (one.refit(fitted, budget) for one in found.ends)
     records = (
         _make_record(one, judge, way, lean) for one in _iterate_within_budget(ends, judge, budget)
@@ -151,7 +151,7 @@ def _search(task: _Task, name: str) -> TermModel | None:
 
 
 @dataclass(frozen=True)
-class Judged:
+class EvaluatedProgram:
     """A program and its errors on both sets."""
 
     program: Simplified
@@ -160,7 +160,7 @@ class Judged:
     """The largest as a share of the budget."""
 
     @classmethod
-    def judge(cls, program: Simplified, judge: Evaluator, budget: Budget) -> "Judged":
+    def judge(cls, program: Simplified, judge: Evaluator, budget: Budget) -> "EvaluatedProgram":
         """Return a program with its errors."""
         errors = judge.compute_errors(program)
         return cls(program, errors, judge.compute_worst_ratio(errors, budget))
@@ -173,7 +173,7 @@ class Judged:
 
 def _iterate_within_budget(
     ends: Iterable[Simplified], judge: Evaluator, budget: Budget
-) -> Iterator[Judged]:
+) -> Iterator[EvaluatedProgram]:
     """Yield the programs within the budget, the leanest first; among equals the most exact first.
 
     Args:
@@ -183,7 +183,8 @@ def _iterate_within_budget(
     """
     for _, alike in groupby(ends, lambda one: one.program.n_operations):
         judged = sorted(
-            (Judged.judge(one, judge, budget) for one in alike), key=lambda one: one.strain
+            (EvaluatedProgram.judge(one, judge, budget) for one in alike),
+            key=lambda one: one.strain,
         )
         yield from (one for one in judged if one.strain <= 1)
 
@@ -247,7 +248,7 @@ def _warn_of_missing(names: list[str], others: bool, part: str) -> None:
 
 
 def _make_record(
-    best: Judged, judge: Evaluator, front: list[Judged], lean: LeanModels
+    best: EvaluatedProgram, judge: Evaluator, front: list[EvaluatedProgram], lean: LeanModels
 ) -> TermModel | None:
     """Return a program with its errors and front, or None if one of its M is not positive definite."""
     one, (estimation, validation) = best.program, best.errors
@@ -285,9 +286,9 @@ def _make_record(
     )
 
 
-def _make_front(programs: list[Judged], judge: Evaluator) -> TermFront:
+def _make_front(programs: list[EvaluatedProgram], judge: Evaluator) -> TermFront:
     """Return the Pareto front of programs by operations and worst ratio to the budget."""
-    kept: list[Judged] = []
+    kept: list[EvaluatedProgram] = []
     for one in sorted(programs, key=lambda one: one.rank):
         if not kept or one.strain < kept[-1].strain:
             kept.append(one)

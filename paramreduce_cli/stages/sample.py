@@ -367,7 +367,9 @@ def _iterate_states(series: list[FloatArray], period: float, points: int, finer:
         own, between = basis((coefficients.shape[1] - 1) // 2, span.stop - span.start)
         way = None if between is None else between.evaluate(coefficients)[0]
         states = own.evaluate(coefficients)
-        return StateBlock(span.trajectory, times[span.start : span.stop], *states, way=way)
+        return StateBlock(
+            span.trajectory, times[span.start : span.stop], *states, fine_positions=way
+        )
 
     return at
 

@@ -31,7 +31,7 @@ _LIKELY = 2.0
 """Operations more than the leanest has, with which a descent is drawn a third as often."""
 _ON_THE_WAY = 16
 """Programs of a front."""
-_DICE = 2**40
+_LARGEST_SEED = 2**40
 """Ways for the dice of rewriting to fall."""
 _EXACT = 1e-18
 """Squared share of the budget below which errors are no more than rounding."""
@@ -105,13 +105,13 @@ class SearchHistory:
     """The best program of every number of operations."""
     fewest: int
     """Operations of the leanest program, which may not be remembered any more."""
-    strain: float
-    """Worst ratio to the budget at the end of the descent."""
+    total_cost: float
+    """Cost at the end of the descent, including errors on watched samples."""
 
     @property
     def rank(self) -> tuple[int, float]:
         """Fewest operations, then worst ratio to the budget; less is better, and equal ends have equal ranks."""
-        return self.fewest, round(self.strain, _SAME)
+        return self.fewest, round(self.total_cost, _SAME)
 
     def rebuild(self, passed: Candidate, seed: int = 0) -> Simplified:
         """Return the program of a candidate, with its sums and products rearranged as a seed says."""
@@ -169,7 +169,7 @@ class Descent:
         near = [count for count in sorted(history.visited) if count <= history.fewest / _LEG]
         count = int(rng.choice(near))
         dearer = {known: passed for known, passed in history.visited.items() if known > count}
-        whole = history.rebuild(history.visited[count], int(rng.integers(_DICE)))
+        whole = history.rebuild(history.visited[count], int(rng.integers(_LARGEST_SEED)))
         return cls._make(whole, searching, dearer)
 
     @classmethod
@@ -189,7 +189,7 @@ class Descent:
     @property
     def history(self) -> SearchHistory:
         """Return the history so far."""
-        return SearchHistory(self.start, self.visited, min(self.visited), self.end.fit.strain)
+        return SearchHistory(self.start, self.visited, min(self.visited), self.end.fit.total_cost)
 
     def descend(self, noise: float = 0.0) -> SearchHistory:
         """Remove terms until none can go, also terms that appear by rewriting.
@@ -228,10 +228,10 @@ class Descent:
     def _note(self, step: Step) -> None:
         """Remember a program."""
         known = self.visited.get(step.count)
-        if known is None or step.fit.excess < known.excess:
+        if known is None or step.fit.worst_ratio < known.excess:
             fit = step.fit
             passed = Candidate(
-                self.search.tape, fit.pruning, fit.beta, self.units, fit.cost, fit.excess
+                self.search.tape, fit.pruning, fit.beta, self.units, fit.cost, fit.worst_ratio
             )
             self.visited[step.count] = passed
 

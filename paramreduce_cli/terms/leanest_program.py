@@ -21,8 +21,8 @@ from paramreduce_cli.terms.descent import (
     list_front,
 )
 from paramreduce_cli.terms.parallel_descents import (
-    Again,
-    Near,
+    NearbyStart,
+    Restart,
     Searcher,
     WorkerGroup,
     start_searchers,
@@ -96,15 +96,15 @@ def simplify(
     begins = _list_first(searcher, order_by_estimate(starts, smallest.model.n))
     told = _ProgressMeter(progress, len(begins) + 2 * max_rounds + _CLOSELY)
 
-    def beside(ends: Sequence[SearchHistory], turn: int) -> Near:
+    def beside(ends: Sequence[SearchHistory], turn: int) -> NearbyStart:
         rng = np.random.default_rng([searcher.seed, turn, 1])
         best = find_leanest_histories(ends, _BEST)
         parent = best[turn % len(best)] if rng.random() > _DRAWN else draw_history(ends, rng)
-        return Near(parent.start, [one.start for one in best], turn)
+        return NearbyStart(parent.start, [one.start for one in best], turn)
 
-    def before(ends: Sequence[SearchHistory], turn: int) -> Again:
+    def before(ends: Sequence[SearchHistory], turn: int) -> Restart:
         best = find_leanest_histories(ends, _BEST)
-        return Again(best[turn % len(best)], turn)
+        return Restart(best[turn % len(best)], turn)
 
     pays = told.ahead * _estimate_work(searcher, begins) > _MANY
     with start_searchers(searcher, jobs if pays else 1, told, deadline) as working:
@@ -195,5 +195,5 @@ def _list_first(searcher: Searcher, starts: Iterable[Start]) -> list[Descent]:
 
 def _estimate_work(searcher: Searcher, descents: Sequence[Descent]) -> float:
     """Return the operations times torques of a program, averaged over descents."""
-    torques = searcher.looked_at.samples.tau.shape[0]
+    torques = searcher.search_samples.samples.tau.shape[0]
     return float(np.mean([max(one.visited) for one in descents]) * torques)

@@ -35,23 +35,23 @@ class SearchSamples:
     """Samples whose errors must also be within the budget."""
 
 
-class Near(NamedTuple):
-    """A start near which is another one to go down from."""
+class NearbyStart(NamedTuple):
+    """A start to vary before descending from it."""
 
     start: Start
     others: list[Start]
     """Starts that parts may be copied from."""
-    turn: int
-    """Number of the dice."""
+    seed_index: int
+    """Index of the random seed."""
 
 
-class Again(NamedTuple):
-    """A descent to go down once more from shortly before its end."""
+class Restart(NamedTuple):
+    """A finished descent to repeat from shortly before its end."""
 
-    way: SearchHistory
+    history: SearchHistory
     """History of the descent."""
-    turn: int
-    """Number of the dice."""
+    seed_index: int
+    """Index of the random seed."""
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,7 @@ class Searcher:
 
     lean: LeanModels
     """Programs of reduced models."""
-    looked_at: SearchSamples
+    search_samples: SearchSamples
     """Samples for most of the search."""
     closely: SearchSamples
     """More samples, for the best of what was found."""
@@ -75,25 +75,27 @@ class Searcher:
     def start_descent(self, start: Start, turn: int = 0) -> Descent:
         """Return a descent with all terms of a start."""
         program = start.build_program(self.lean, direct=self.direct)
-        return Descent.start_from(start, program, self._make_search(start, self.looked_at, turn))
+        return Descent.start_from(
+            start, program, self._make_search(start, self.search_samples, turn)
+        )
 
     def descend(self, start: Start) -> SearchHistory:
         """Descend from a start until no more terms can go."""
         return self.start_descent(start).descend()
 
-    def descend_nearby(self, what: Near) -> SearchHistory | None:
+    def descend_nearby(self, what: NearbyStart) -> SearchHistory | None:
         """Descend from a start near another one, with noise half of the time; return None if it is not within the
         budget. The function is the same at first, but at the edge of the budget rounding may decide.
         """
-        rng = np.random.default_rng([self.seed, what.turn])
+        rng = np.random.default_rng([self.seed, what.seed_index])
         start = vary_start(what.start, what.others, self.lean, rng, direct=self.direct)
-        return _descend(self.start_descent(start, what.turn), rng)
+        return _descend(self.start_descent(start, what.seed_index), rng)
 
-    def repeat_descent(self, what: Again) -> SearchHistory | None:
+    def repeat_descent(self, what: Restart) -> SearchHistory | None:
         """Descend from a program shortly before the end of a descent, written in another way."""
-        rng = np.random.default_rng([self.seed, what.turn, 2])
-        searching = self._make_search(what.way.start, self.looked_at, what.turn)
-        return _descend(Descent.restart(what.way, rng, searching), rng)
+        rng = np.random.default_rng([self.seed, what.seed_index, 2])
+        searching = self._make_search(what.history.start, self.search_samples, what.seed_index)
+        return _descend(Descent.restart(what.history, rng, searching), rng)
 
     def descend_closely(self, history: SearchHistory) -> SearchHistory | None:
         """Continue a descent with more samples."""

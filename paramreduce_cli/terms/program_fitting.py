@@ -112,19 +112,19 @@ class TermFit:
     """(n_parameters,)"""
     torque_error: float
     acceleration_error: float
-    """Infinite where a mass matrix is not positive definite; not a number where it is not asked for."""
+    """Acceleration error: infinite if a mass matrix is not positive definite, NaN if it was not requested."""
     cost: float
-    """Sum of the squares of both errors over the allowed ones."""
-    strain: float
-    """The same with errors on watched samples, which are looked at where the others are allowed."""
-    excess: float
-    """The largest of all errors over the allowed one."""
+    """Sum of the squared ratios of both errors to their limits."""
+    total_cost: float
+    """Cost including errors on watched samples, which count if the other errors are within the budget."""
+    worst_ratio: float
+    """Largest ratio of an error to its limit."""
     linear: Linear
 
     @property
     def within(self) -> bool:
         """Whether all errors are allowed."""
-        return self.excess <= 1.0
+        return self.worst_ratio <= 1.0
 
 
 class Fitting:

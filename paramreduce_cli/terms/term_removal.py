@@ -128,16 +128,18 @@ class TermSearch:
         for number in np.unique(np.concatenate(lists)):
             changed = self._fit_flipped(fit, live[number : number + 1])
             if changed.within:
-                tried.append(((changed.strain - fit.strain) / saved[number], number, changed))
+                tried.append(
+                    ((changed.total_cost - fit.total_cost) / saved[number], number, changed)
+                )
         if not tried:
             return None
         tried.sort(key=lambda entry: entry[0])
         _, number, best = tried[0]
         chosen = [number]
         for _, number, alone in tried[1:_AT_ONCE]:
-            expected = best.strain + max(alone.strain - fit.strain, 0.0) * _SUM_HOLDS
+            expected = best.total_cost + max(alone.total_cost - fit.total_cost, 0.0) * _SUM_HOLDS
             changed = self._fit_flipped(fit, live[[*chosen, number]])
-            if changed.within and changed.strain <= expected:
+            if changed.within and changed.total_cost <= expected:
                 best, chosen = changed, [*chosen, number]
         return self._step(best)
 
@@ -155,11 +157,11 @@ class TermSearch:
         fit = step.fit
         order = np.argsort(costs / saved, kind="stable")
         expected = np.cumsum(np.maximum(costs[order], 0.0))
-        little = min(_LITTLE * (1 - fit.excess**2), max(_RISE * fit.excess**2, _LEAST))
+        little = min(_LITTLE * (1 - fit.worst_ratio**2), max(_RISE * fit.worst_ratio**2, _LEAST))
         size = int(np.searchsorted(expected, little, side="right"))
         while size > 1:
             changed = self._fit_flipped(fit, live[order[:size]])
-            if changed.within and changed.strain - fit.strain <= _MISJUDGED * little:
+            if changed.within and changed.total_cost - fit.total_cost <= _MISJUDGED * little:
                 return self._step(changed)
             size //= 2
         return None
@@ -182,7 +184,7 @@ class TermSearch:
         for place in np.unique(np.concatenate(lists)):
             changed = self._fitting.fit(fit.pruning.replace(*ways.get(place)), fit.beta)
             if changed.within:
-                tried.append(((changed.strain - fit.strain) / saved[place], place, changed))
+                tried.append(((changed.total_cost - fit.total_cost) / saved[place], place, changed))
         return self._step(min(tried, key=lambda entry: entry[:2])[2]) if tried else None
 
     def _find_useful(self, step: Step) -> tuple[IntArray, FloatArray]:

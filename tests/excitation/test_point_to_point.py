@@ -104,9 +104,9 @@ def test_motions_of_loops_keep_to_constraints_and_can_be_sampled():
     at = evaluate_along(motions, 20, 4)
     for span in make_spans([20] * len(motions)):
         block = at(span)
-        assert block.way.shape == (80, home.size)
-        np.testing.assert_allclose(block.way[::4], block.z, atol=1e-12)
-        q = coordinates.compute_positions(block.way, None)
+        assert block.fine_positions.shape == (80, home.size)
+        np.testing.assert_allclose(block.fine_positions[::4], block.z, atol=1e-12)
+        q = coordinates.compute_positions(block.fine_positions, None)
         assert (quantities.compute_rows(q) <= 1e-9).all()
 
 

@@ -49,9 +49,9 @@ def gone_down(searcher, start, monkeypatch, kind, rounds, gains):
     fewest = [way.fewest]
 
     def work(self, what):
-        turns.append(what.turn)
-        fewest[0] -= gains.get(what.turn, 0)
-        return replace(way, fewest=fewest[0] if what.turn in gains else way.fewest + 1)
+        turns.append(what.seed_index)
+        fewest[0] -= gains.get(what.seed_index, 0)
+        return replace(way, fewest=fewest[0] if what.seed_index in gains else way.fewest + 1)
 
     for name in ("descend_nearby", "repeat_descent"):
         monkeypatch.setattr(Searcher, name, work if name == kind else lambda self, what: None)

@@ -557,7 +557,7 @@ def test_errors_on_a_log_are_watched_on_other_quarters_than_are_fitted(measured_
     seen = []
 
     def nothing(searcher, starts, **__):
-        seen.extend([searcher.looked_at, searcher.closely])
+        seen.extend([searcher.search_samples, searcher.closely])
         return leanest_program.Found([], [])
 
     module = sys.modules["paramreduce_cli.stages.reduce_terms"]

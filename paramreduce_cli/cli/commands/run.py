@@ -82,14 +82,14 @@ def run(
     with locate_errors(config, overrides), store.lock():
         words = format_arguments(config, results, overrides)
         _say_what_is_replaced(
-            Runner(loaded, store, asked=words), changed=bool(overrides) and results is None
+            Runner(loaded, store, arguments=words), changed=bool(overrides) and results is None
         )
         stages = list_stages_to_run(loaded)
         for number, stage in enumerate(stages, 1):
             label = f"{number}/{len(stages)} {stage.name}"
             with show_progress(label, quiet, as_json) as progress:
                 runner = Runner(
-                    loaded, store, jobs or count_cores(), make_callbacks(progress), asked=words
+                    loaded, store, jobs or count_cores(), make_callbacks(progress), arguments=words
                 )
                 outcome = runner.run(stage, force=force)
             if as_json:
