@@ -17,7 +17,11 @@ if TYPE_CHECKING:
 
 
 def __getattr__(name: str) -> Any:
-    """Return a name of the interface, which is loaded at the first one: the command line does without."""
+    """Return a name of the interface, which is loaded at the first one: the command line does without.
+
+    Raises:
+        AttributeError: The interface has no such name.
+    """
     if name == "__all__" or not name.startswith("_"):
         import paramreduce_cli.api as api
 

@@ -400,7 +400,11 @@ class Results:
 
 
 def _run_stage(kind: type, config: Config | Settings, *records: Any, jobs: int = 1) -> Any:
-    """Run the stage that makes a kind of record."""
+    """Run the stage that makes a kind of record.
+
+    Raises:
+        TypeError: The config is neither a Config nor Settings.
+    """
     stage = find_maker(kind)
     if not isinstance(config, Config | Settings):
         raise TypeError(

@@ -263,7 +263,11 @@ class Reader:
         return name in self.file
 
     def read_array(self, name: str, dimensions: int | None = None) -> np.ndarray:
-        """Return a numeric dataset as a whole."""
+        """Return a numeric dataset as a whole.
+
+        Raises:
+            ArtifactError: The dataset is missing, not of numbers, or has another number of dimensions.
+        """
         value = np.asarray(self._open_dataset(name).read_whole())
         if value.dtype.kind not in "fiub":
             raise ArtifactError(f"{self.path}: /{name} must hold numbers.")
@@ -274,7 +278,11 @@ class Reader:
         return value
 
     def read_texts(self, name: str) -> tuple[str, ...]:
-        """Return a dataset of texts."""
+        """Return a dataset of texts.
+
+        Raises:
+            ArtifactError: The dataset is missing or not of text.
+        """
         data = self._open_dataset(name)
         if not h5py.check_string_dtype(data.dtype) and data.size:
             raise ArtifactError(f"{self.path}: /{name} must hold text.")
@@ -292,7 +300,11 @@ class Reader:
         return value.decode() if isinstance(value, bytes) else value
 
     def open_rows(self, name: str) -> CheckedRows:
-        """Return a numeric dataset that is read in slices of rows."""
+        """Return a numeric dataset that is read in slices of rows.
+
+        Raises:
+            ArtifactError: The dataset is missing or no array of real numbers.
+        """
         data = self._open_dataset(name)
         if data.dtype.kind not in "fiu" or data.ndim == 0:
             raise ArtifactError(f"{self.path}: /{name} must hold an array of real numbers.")

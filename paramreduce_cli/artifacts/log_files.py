@@ -89,7 +89,11 @@ def _read_columns(rows: Any) -> FloatArray:
 
 
 def _load_npz(path: Path) -> RawLog:
-    """Return the arrays of an NPZ file as a log."""
+    """Return the arrays of an NPZ file as a log.
+
+    Raises:
+        ArtifactError: The file is missing or no NPZ file.
+    """
     check_is_file(path)
     try:
         with zipfile.ZipFile(path) as archive:
@@ -109,6 +113,9 @@ def _iterate_members(
     Args:
         archive: The file.
         others: What other arrays hold is added, by name.
+
+    Raises:
+        ValueError: An array is shorter or longer than its header says.
     """
     for info in archive.infolist():
         with archive.open(info) as file:
@@ -145,6 +152,9 @@ def _split_columns(
         path: The file.
         matrices: Names and arrays, (n_rows, n_columns) each.
         others: What datasets without numbers hold, by name.
+
+    Raises:
+        DataError: There are no numbers, or a matrix has its samples in columns.
     """
     found = dict(matrices)
     lengths = {matrix.shape[0] for matrix in found.values() if matrix.shape[1] == 1}
@@ -170,6 +180,10 @@ def _split_columns(
 def _load_bag(path: Path) -> RawLog:
     """Return the fields of all messages of a bag as TOPIC/field, of joint states as TOPIC/position/JOINT, with
     TOPIC/time.
+
+    Raises:
+        DataError: No message has numbers.
+        ArtifactError: The bag is missing or unreadable, or rosbags is not installed.
     """
     # Late: an extra, of use to those who have bags.
     try:

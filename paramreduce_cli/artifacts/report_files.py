@@ -17,7 +17,9 @@ _LISTING = ".exported.json"
 
 
 def save_report(folder: Path, report: Report, stamp: Stamp) -> Stamp:
-    """Write a report's files, its summary last, and remove what a former report left."""
+    """Write a report's files, its summary last, and remove what a former report left; return the stamp with the digest
+    of what was written.
+    """
     for name, content in report.files.items():
         with replace_atomically(folder / name) as path:
             path.write_bytes(content)

@@ -190,7 +190,11 @@ class StoredSet:
         return self._iterate(W=False)
 
     def _iterate(self, *, W: bool) -> Iterator[Block]:
-        """Yield the samples block by block, with or without rows of W."""
+        """Yield the samples block by block, with or without rows of W.
+
+        Raises:
+            ArtifactError: A number is not finite.
+        """
         with open_reader(self._path) as reader:
             base = self._name
             tau = reader.open_rows(f"{base}/tau")
@@ -231,7 +235,12 @@ class StoredSet:
         return lambda start, stop: [data[start:stop] for data in rows]
 
     def _read_column(self, reader: Reader, key: str) -> FloatArray:
-        """Return one number per sample; zeros if the file has none."""
+        """Return one number per sample; zeros if the file has none.
+
+        Raises:
+            ArtifactError: The dataset has another length or numbers that are not finite; numbers of trajectories must
+                be 0, 1, 2, ...
+        """
         name = f"{self._name}/{key}"
         if name not in reader:
             return np.zeros(self.n_samples)
@@ -261,7 +270,11 @@ def _iterate_ranges(owner: FloatArray, most: int) -> Iterator[tuple[int, int]]:
 
 
 def load_samples(reader: Reader) -> Samples:
-    """Return the samples in a file, the project's own or the user's."""
+    """Return the samples in a file, the project's own or the user's.
+
+    Raises:
+        ArtifactError: The file is unreadable, or a dataset is missing or has a wrong shape or wrong numbers.
+    """
     own = reader.read_attribute("stage") == "sample"
     W = _read_matrix_shape(reader, "estimation")
     if len(W) != 2:
@@ -315,7 +328,11 @@ def _read_matrix_shape(reader: Reader, name: str) -> tuple[int, ...]:
 
 
 def _read_optional(reader: Reader, name: str, size: int) -> FloatArray | None:
-    """Return a vector of finite numbers, or None if the file has none."""
+    """Return a vector of finite numbers, or None if the file has none.
+
+    Raises:
+        ArtifactError: The vector has another length, or numbers that are not finite.
+    """
     if name not in reader:
         return None
     value = reader.read_array(name, 1)

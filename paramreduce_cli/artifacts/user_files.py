@@ -57,7 +57,12 @@ def load_coefficients(path: Path) -> Coefficients:
 
 
 def _read_json_coefficients(path: Path) -> tuple[Any, dict[str, FloatArray]]:
-    """Return the period and the coefficients by set in a JSON file."""
+    """Return the period and the coefficients by set in a JSON file.
+
+    Raises:
+        DataError: The file holds no Fourier coefficients.
+        ArtifactError: The file is missing.
+    """
     try:
         data = json.loads(path.read_text(encoding="utf-8"))
         trajectories = data["trajectories"]
@@ -143,7 +148,11 @@ def _read_hdf5_arrays(reader: Reader) -> dict[str, FloatArray]:
 
 
 def _read_csv_arrays(path: Path, n_dof: int) -> dict[str, FloatArray]:
-    """Return the arrays of states and torques in a CSV file."""
+    """Return the arrays of states and torques in a CSV file.
+
+    Raises:
+        DataError: A column is missing, or there are columns of more joints than the robot has.
+    """
     header, data, _ = read_csv(path)
     columns = {name: data[:, k] for k, name in enumerate(header)}
     arrays: dict[str, FloatArray] = {}

@@ -51,7 +51,8 @@ def tabulate_artifact(record: Any, width: int) -> Table | None:
 
 
 @tabulate_artifact.register
-def _(record: Model, width: int) -> Table:
+def _tabulate_base_parameters(record: Model, width: int) -> Table:
+    """Return a table of the base columns: name, body, value and unit."""
     base = [record.mechanism.parameters[k] for k in record.base.columns]
     rows = [
         (p.name, p.owner, f"{record.values[k]:.5g}", p.unit)
@@ -62,7 +63,8 @@ def _(record: Model, width: int) -> Table:
 
 
 @tabulate_artifact.register
-def _(record: Trajectories, width: int) -> Table:
+def _tabulate_trajectories(record: Trajectories, width: int) -> Table:
+    """Return a table of the trajectories: condition number, that of the start, and status."""
     rows = [
         (f"{name} {k}", f"{t.kappa:.4g}", f"{t.kappa_start:.4g}", t.status)
         for name in SETS
@@ -77,13 +79,15 @@ def _(record: Trajectories, width: int) -> Table:
 
 
 @tabulate_artifact.register
-def _(record: Reduction, width: int) -> Table:
+def _tabulate_subset_errors(record: Reduction, width: int) -> Table:
+    """Return a table of the torque error on the estimation set, by size and heuristic."""
     errors = {name: (found.n, found.torque_error) for name, found in record.heuristics.items()}
     return _tabulate_by_size("Torque error on the estimation set", errors, width)
 
 
 @tabulate_artifact.register
-def _(record: Validation, width: int) -> Table:
+def _tabulate_validation_errors(record: Validation, width: int) -> Table:
+    """Return a table of the torque error on the test set, else on the validation set, by size and heuristic."""
     tested = any(found.torque_error.test.size for found in record.heuristics.values())
     title = "Torque error on the validation set"
     if tested:
@@ -99,7 +103,8 @@ def _(record: Validation, width: int) -> Table:
 
 
 @tabulate_artifact.register
-def _(record: Identification, width: int) -> Table:
+def _tabulate_identified_parameters(record: Identification, width: int) -> Table:
+    """Return a table of the identified parameters: value and standard deviation."""
     found = record.reduced
     rows = [
         (name, *format_measured(value, deviation))

@@ -65,7 +65,11 @@ def count_cores() -> int:
 
 
 def make_store(config: Config | None, results: Path | None) -> Store:
-    """Return the results folder of a config, or the folder that the call names."""
+    """Return the results folder of a config, or the folder that the call names.
+
+    Raises:
+        MissingConfigError: There is neither a config nor a folder.
+    """
     if results is not None:
         return Store(results)
     if config is None:

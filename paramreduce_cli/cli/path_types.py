@@ -31,7 +31,11 @@ class ConfigPath(FilePath):
     """A path of a config, or of a results folder that was made with one."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """Return the config; note the results folder if the path is one."""
+        """Return the config; note the results folder if the path is one.
+
+        Raises:
+            MissingConfigError: The path is a results folder whose config is not found.
+        """
         folder = Path(value)
         if ctx is None or not any(folder.glob("*.h5")):
             return super().convert(value, param, ctx)

@@ -156,7 +156,9 @@ def _suggest_meant_place(rejected: str, words: list[str]) -> str:
 
 
 def _replace_by_other_kind(word: str, words: list[str]) -> list[str] | None:
-    """Return the call with a config for results, or results for a config, or a robot's name."""
+    """Return the call with a config for results, or results for a config, or a robot's name; None if there is no such
+    file.
+    """
     config, results = guess_config(word), guess_results(word)
     if word == words[0]:
         return None if config is None or len(words) > 1 else ["run", str(config)]
@@ -170,7 +172,7 @@ def _replace_by_other_kind(word: str, words: list[str]) -> list[str] | None:
 
 
 def _correct_robot_name(word: str, words: list[str]) -> list[str] | None:
-    """Return the call with the config whose name is like a robot's name that was typed."""
+    """Return the call with the config whose name is like a robot's name that was typed, or None."""
     if words[0] not in (*stages, *_OF_CONFIGS) or Path(word).name != word or Path(word).suffix:
         return None
     here = {path.stem: path for path in list_configs(Path())}
@@ -247,7 +249,7 @@ def _replace_word(words: Sequence[str], old: str, new: str) -> list[str] | None:
 
 
 def _find_option(name: str, command: click.Command, words: Sequence[str]) -> str | None:
-    """Return the option that takes the value, is spelt alike, or begins with the one letter that was typed."""
+    """Return the option that takes the value, is spelt alike, or begins with the one letter that was typed, or None."""
     taken = [parameter for parameter in command.params if isinstance(parameter, click.Option)]
     value = " ".join(words).partition(f" {name}")[2].lstrip(" =").split(" ")[0]
     for parameter in taken:

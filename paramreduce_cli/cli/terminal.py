@@ -52,7 +52,7 @@ _OWN_LINE = re.compile(rb"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d |$")
 
 
 class Journal:
-    """A file that is told what is said, with times; and whether every step is."""
+    """A log file of the messages, with times, and a switch for messages on every step."""
 
     def __init__(self) -> None:
         self._file: TextIO | None = None

@@ -89,7 +89,11 @@ class ClearanceSection(Section):
                     )  # fmt: skip
 
     def _cover_bodies(self, mechanism: Mechanism) -> dict[int, tuple[FloatArray, FloatArray]]:
-        """Return centres (k, 3) and radii (k,) of spheres that cover the capsules of each body."""
+        """Return centres (k, 3) and radii (k,) of spheres that cover the capsules of each body.
+
+        Raises:
+            ConfigError: A capsule is on a body that the robot lacks.
+        """
         numbers = {body.name: k for k, body in enumerate(mechanism.bodies)} | {BASE_NAME: BASE}
         named = [*self.capsules, *(name for pair in self.ignore for name in pair)]
         for name in named:

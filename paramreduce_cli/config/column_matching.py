@@ -80,7 +80,7 @@ def list_named_joints(names: Sequence[str]) -> list[str]:
 
 
 def _count_surplus_joints(names: Sequence[str], n: int) -> int:
-    """Return the number of joints that the numbered columns have, if there are more than n, else zero."""
+    """Return the number of joints that the numbered columns are for, all of them counted, if it exceeds n; else zero."""
     most = n
     while all(_match_numbered(names, _WORDS[key], most + 1) is not None for key in _NEEDED):
         most += 1

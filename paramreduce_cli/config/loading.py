@@ -246,7 +246,7 @@ def _replace_item(value: str, place: Key, name: str) -> str:
 
 
 def _find_all_problems(data: dict[str, Any]) -> tuple[Config | None, list[Problem]]:
-    """Return the config and its problems: structural ones first; then, with those parts cut out, the rest."""
+    """Return the config, None if it has problems, and these: structural ones first, then those of the other parts."""
     constants, unreadable = read_constants(data.get("constants"))
     mistaken: list[Problem] = [(("constants", name), text) for name, text in unreadable.items()]
     try:

@@ -97,7 +97,7 @@ def _check_depth(text: str) -> None:
 
 
 def _count_values(node: yaml.Node, counts: dict[int, int], depth: int) -> int:
-    """Return the number of values in a node, counting aliases as often as they repeat; each node is visited once."""
+    """Raises yaml.YAMLError: The aliases are nested too deeply."""
     if depth > _DEEPEST:
         raise yaml.YAMLError(_TOO_DEEP)
     if id(node) not in counts:

@@ -76,7 +76,7 @@ def find_resting_position(
 
 
 def _stop_inside(intermediate_result: "scipy.optimize.OptimizeResult") -> None:
-    """End the search well inside the bounds."""
+    """End the search well inside the bounds by raising StopIteration, which SciPy takes as the end."""
     if intermediate_result.fun < -_WELL_INSIDE:
         raise StopIteration
 

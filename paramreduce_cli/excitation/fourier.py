@@ -47,7 +47,7 @@ def sample_times(period: float, points: int) -> FloatArray:
 
 
 def evaluate_basis(period: float, harmonics: int, time: FloatArray) -> FourierBasis:
-    """Return the series' functions at given times.
+    """Return the functions whose weighted sum is the series, and their derivatives, at given times.
 
     Args:
         period: Period, s.

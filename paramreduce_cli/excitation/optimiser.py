@@ -117,7 +117,7 @@ class TrajectorySettings:
         return self.polished + round(fraction * (self.starts - self.polished))
 
     def build_basis(self, finer: int = 1) -> FourierBasis:
-        """Return the basis of the series on the grid, or on a grid that is so many times finer."""
+        """Return the basis of the series on the grid, or on a grid that is ``finer`` times as fine."""
         return self._build_basis_on(finer * self.points)
 
     def build_coarse_basis(self) -> FourierBasis:
@@ -310,7 +310,9 @@ class _Search:
         return end.iterations
 
     def _build_objective(self, grid: _Grid, level: Level) -> FreeObjective:
-        """Return the objective of a level on a grid."""
+        """Return what IPOPT minimises in a step of the plan: the condition number on a grid, smoothed as the step's
+        level says.
+        """
         positions = Follower(self._excitation.coordinates)
         return FreeObjective(
             self._excitation, grid.basis, grid.limits, level, positions, self._mixing
@@ -345,7 +347,12 @@ class _Search:
 def compute_fine_positions(
     excitation: Excitation, settings: TrajectorySettings, series: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Return times and generalised coordinates on the grid on which bounds are checked.
+    """Return times and generalised coordinates along a trajectory, on the fine grid on which bounds are checked.
+
+    Args:
+        excitation: Robot, with its coordinates and bounds.
+        settings: Settings with the period and the number of points.
+        series: Coefficients of the trajectory's Fourier series.
 
     Raises:
         DataError: The loops cannot be closed along it.

@@ -132,7 +132,11 @@ class _ForwardDynamics:
         return np.array([signal(time, *state) for signal, *state in pairs])
 
     def compute_rates(self, time: float, state: FloatArray) -> FloatArray:
-        """Return the derivative of positions and velocities, (2 n_dof,)."""
+        """Return the derivative of positions and velocities, (2 n_dof,).
+
+        Raises:
+            DataError: The motion diverges, or the mass matrix is singular.
+        """
         self._left -= 1
         if self._left < 0 or not np.isfinite(state).all():
             raise _make_divergence_error(time)

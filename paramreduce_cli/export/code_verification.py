@@ -136,7 +136,7 @@ def check_against_mechanism(
     Args:
         model: The robot.
         stored: States and the torques of the exported model, (n_states, ...) by name.
-        least: Smallest sizes that results are judged by, by name.
+        least: Lower bounds, by name of the result, of the magnitudes that differences are divided by.
 
     Raises:
         FormulationError: A parameter that was taken for one without effect has one.

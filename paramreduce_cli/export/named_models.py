@@ -91,7 +91,11 @@ def find_chosen_model(
 def _make_identified_model(
     text: str, model: Model, identification: Identification
 ) -> tuple[ReducedModel, str]:
-    """Return the identified or the physically consistent model, and its title."""
+    """Return the identified or the physically consistent model, and its title.
+
+    Raises:
+        ConfigError: The physically consistent model is asked for and was not identified.
+    """
     if text == IDENTIFIED:
         found = identification.full
         chosen = make_base_model(model)

@@ -90,7 +90,11 @@ def _make_pseudo_inertias(mechanism: Mechanism, standard: FloatArray) -> dict[st
 
 
 def _make_inertial(name: str, body: FloatArray) -> Inertial | None:
-    """Return mass, centre of mass and inertia of a body; None if all are zero."""
+    """Return mass, centre of mass and inertia of a body; None if all are zero.
+
+    Raises:
+        ConfigError: The body has moments but no mass, for which a URDF has no form.
+    """
     mass = float(body[3, 3])
     if not body.any():
         return None

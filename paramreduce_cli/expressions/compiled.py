@@ -132,7 +132,11 @@ def _get_address(array: FloatArray) -> int:
 
 @cache
 def find_compiler() -> tuple[str, ...] | None:
-    """Return the C compiler's command: ``$CC`` if set, else gcc or cc; None if there is none."""
+    """Return the C compiler's command: ``$CC`` if set, else gcc or cc; None if there is none.
+
+    Raises:
+        ConfigError: ``$CC`` cannot be split into words.
+    """
     try:
         wanted = shlex.split(os.environ.get("CC", ""))
     except ValueError as error:

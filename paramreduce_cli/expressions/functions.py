@@ -77,7 +77,7 @@ class Function:
         return f"{total}, {once} of them on parameters alone." if once else f"{total}."
 
     def iterate_steps(self) -> Iterator[tuple[int, Node]]:
-        """Yield numbers and nodes of the operations, in an order in which they can be computed."""
+        """Yield index and node of each operation, in an order in which they can be computed."""
         for number, node in enumerate(self.program.nodes):
             if node.operation not in ("constant", "input"):
                 yield number, node

@@ -25,11 +25,11 @@ class Node(NamedTuple):
 
 
 class Graph:
-    """A growing set of nodes.
+    """A growing set of nodes, each made once. A reference to node k is the integer 2 k, or 2 k + 1 for its negative.
 
     Args:
-        signs_free: Whether signs are carried along as part of values, and so cost nothing; if
-            not, a negation is a node like any other.
+        signs_free: Whether signs are part of references, and so cost nothing; if not, a negation is a node like any
+            other.
     """
 
     def __init__(self, *, signs_free: bool = True) -> None:
@@ -50,7 +50,7 @@ class Graph:
         return 2 * len(self.nodes) - 2
 
     def _make_value(self, operation: str, operands: tuple[int, ...]) -> int:
-        """Return the value of an operation on values."""
+        """Return the reference to the node of an operation, which is added if it is new."""
         index = self._indices[operation]
         value = index.get(operands)
         if value is None:
@@ -58,7 +58,9 @@ class Graph:
         return value
 
     def constant(self, number: float) -> int:
-        """Return the value of a number."""
+        """Return the reference to a constant, which gets a node if it is new; a negative one is the negated node of its
+        size.
+        """
         size = abs(number)
         value = self._constants.get(size)
         if value is None:
@@ -67,14 +69,14 @@ class Graph:
         return value ^ (number < 0)
 
     def input(self, position: int) -> int:
-        """Return one of the inputs, by position."""
+        """Return the reference to an input, by position."""
         value = self._inputs.get(position)
         if value is None:
             value = self._inputs[position] = self._append(Node("input", (), position))
         return value
 
     def number(self, value: int) -> float | None:
-        """Return the value of a constant, None for other nodes."""
+        """Return the number that a reference to a constant stands for, None for other nodes."""
         number = self._numbers.get(value >> 1)
         return -number if number is not None and value & 1 else number
 
@@ -157,7 +159,7 @@ class Graph:
         return self._make_value(function, values)
 
     def find_reached(self, outputs: list[int]) -> list[int]:
-        """Return the numbers of the nodes that outputs depend on; operands come before their users."""
+        """Return the indices of the nodes that outputs depend on; operands come before their users."""
         seen = {value >> 1 for value in outputs}
         pending = list(seen)
         while pending:
@@ -169,7 +171,7 @@ class Graph:
         return sorted(seen)
 
     def count_operations(self, outputs: list[int]) -> int:
-        """Return the operations of outputs: all their nodes except constants and inputs."""
+        """Return the number of operations of outputs: all their nodes except constants and inputs."""
         return sum(
             self.nodes[node].operation not in ("constant", "input")
             for node in self.find_reached(outputs)

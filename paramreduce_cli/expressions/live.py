@@ -48,7 +48,7 @@ class LiveCount:
 def _count_live(
     kinds: IntArray, operands: IntArray, inputs: IntArray, outputs: IntArray, zero: BoolArray
 ) -> int:
-    """Return the operations that outputs still need when some inputs are zero."""
+    """Return the number of operations that outputs still need when some inputs are zero."""
     n = kinds.size
     stands_for = np.arange(n)
     for k in range(n):

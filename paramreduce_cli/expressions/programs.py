@@ -243,7 +243,11 @@ def _add_signed(graph: Graph, values: list[int], negated: list[int]) -> int:
 
 
 def _translate_operation(op: int, operands: tuple[int, ...]) -> Node:
-    """Return the node of one of CasADi's operations."""
+    """Return the node of one of CasADi's operations.
+
+    Raises:
+        NotImplementedError: The graph has no node for this operation.
+    """
     if op == ca.OP_SQ:
         return Node("*", (operands[0], operands[0]))
     if op == ca.OP_TWICE:

@@ -30,7 +30,7 @@ _SHOWN = 80
 
 
 def _abbreviate(value: Any) -> str:
-    """Return a value as text, cut after so many characters."""
+    """Return a value as text, cut after ``length`` characters."""
     text = repr(value)
     return text if len(text) <= _SHOWN else f"{text[:_SHOWN]}..."
 

@@ -21,7 +21,7 @@ Outliers = Mapping[tuple[str, int], Sequence[float]]
 
 @dataclass(frozen=True)
 class Place:
-    """A place of the shown motion among all motions."""
+    """The position of the shown motion among all motions."""
 
     file: int
     learned: int
@@ -85,7 +85,7 @@ def collect_signals(
         recorded: Times, positions, speeds and torques as recorded.
         ready: Processed training motion, with the held-out part of the same motion if there is one.
         torque_cutoff: Cut-off frequency of the low-pass that torques still have to pass, Hz.
-        rate: Samples per second of what is ready.
+        rate: Samples per second of the processed signals.
         outliers: Outliers of the file.
     """
     taps = filters.design_low_pass(torque_cutoff, rate)
@@ -107,7 +107,14 @@ def collect_signals(
 
 
 def _decimate_processed(s: Signals, taps: FloatArray) -> list[FloatArray]:
-    """Return times, states and filtered torques of a processed motion, decimated."""
+    """Return times, speeds, accelerations and low-passed torques of a motion, decimated.
+
+    States have been low-passed before.
+
+    Args:
+        s: Motion that has been processed, with speeds and accelerations.
+        taps: Coefficients of the low-pass filter.
+    """
     assert s.dz is not None, "made ready"
     assert s.ddz is not None, "made ready"
     torques = (filters.apply_filter(s.tau[:, j : j + 1], taps)[:, 0] for j in range(s.tau.shape[1]))

@@ -182,7 +182,11 @@ def _read_files(
     unmeasured: Collection[str],
     steps: list[str],
 ) -> _Files:
-    """Return the signals of log files, with jumps cut out, outliers replaced and even time steps."""
+    """Return the signals of log files, with jumps cut out, outliers replaced and even time steps.
+
+    Raises:
+        DataError: A file is unusable, as the message says with its name, or has another rate than the first one.
+    """
     files = _Files()
     for log in logs:
         source = log.source
@@ -288,7 +292,11 @@ def _estimate_spectra(piece: Signals, rate: float) -> Spectra:
 def _choose_cutoffs(
     section: LogSection, spectra: Spectra, rate: float, steps: list[str]
 ) -> _Cutoffs:
-    """Return the cut-off frequencies that the config gives, or that the spectra suggest."""
+    """Return the cut-off frequencies that the config gives, or that the spectra suggest.
+
+    Raises:
+        ConfigError: A given cut-off is not below half of the rate.
+    """
     band = filters.find_motion_band(spectra.frequency, spectra.velocity)
 
     def chosen(given: Frequency, automatic: float, key: str) -> float:
@@ -379,7 +387,11 @@ def _process_joint(
 
 
 def _join_pieces(pieces: list[Piece], folds: int) -> MeasuredMotions:
-    """Return the pieces as one record, with folds of equal duration."""
+    """Return the pieces as one record, with folds of equal duration.
+
+    Raises:
+        DataError: No sample is left to hold out.
+    """
     pieces = [piece for piece in pieces if piece.used.stop > piece.used.start]
     if not pieces:
         raise DataError(_TOO_SHORT.format("held out"))

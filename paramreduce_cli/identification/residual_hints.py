@@ -212,7 +212,9 @@ def _make_missing_hint(
 
 
 def _make_smoothing_hint(name: str, speed: float) -> Callable[[float, float], str | None]:
-    """Return a function that words the hint at smooth friction."""
+    """Return a function that words the hint at smooth friction from the fitted coefficient and the share of the
+    residuals.
+    """
 
     def said(coefficient: float, fraction: float) -> str:
         return (
@@ -238,7 +240,7 @@ def _make_scale_hint(name: str) -> Callable[[float, float], str | None]:
 
 
 def _make_delay_hint(step: float, known_delay: float) -> Callable[[float, float], str | None]:
-    """Return a function that words the hint at a delay of torques."""
+    """Return a function that words the hint at a delay of torques; it returns None for delays far below a time step."""
 
     def said(coefficient: float, fraction: float) -> str | None:
         if abs(coefficient) < _DELAY * step:
@@ -253,7 +255,7 @@ def _make_delay_hint(step: float, known_delay: float) -> Callable[[float, float]
 
 
 def _make_tilt_hint(axis: str, gravity: float) -> Callable[[float, float], str | None]:
-    """Return a function that words the hint at a tilted base."""
+    """Return a function that words the hint at a tilted base; it returns None for small angles."""
 
     def said(coefficient: float, fraction: float) -> str | None:
         angle = float(np.degrees(np.arctan2(abs(coefficient), gravity)))

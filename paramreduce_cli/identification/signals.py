@@ -102,7 +102,11 @@ def read_signals(
 
 
 def _convert_to_joints(signals: Signals, section: LogSection, n_dof: int) -> Signals:
-    """Convert signals of motors to signals of joints, in place, as there may be gigabytes."""
+    """Convert signals of motors to signals of joints, in place, as there may be gigabytes.
+
+    Raises:
+        ConfigError: The transmission matrix cannot be inverted or has another size.
+    """
     sign = _expand_per_joint(section.apart.motion, "signs", n_dof)
     tau = signals.tau
     tau *= _expand_per_joint(section.apart.torque, "signs", n_dof)
@@ -152,7 +156,20 @@ def _read_matrix(
     times: str,
     left_out: Collection[str],
 ) -> FloatArray:
-    """Return the columns of a quantity, (n_rows, n_dof); raise DataError if columns are missing."""
+    """Return the columns of a quantity, (n_rows, n_dof); columns of joints that are left out are zero.
+
+    Args:
+        log: Log as read.
+        names: Names of the columns, or a pattern with ``{n}`` or ``{name}``.
+        joints: Names of the joints.
+        key: Key of the quantity under sampling.log.columns, for messages.
+        times: Name of the column of times, whose length the others must have.
+        left_out: Joints without measurements, which need no column.
+
+    Raises:
+        ConfigError: The list of names is of another number of joints.
+        DataError: A column is missing, unusable, or of another length, or there are columns of more joints.
+    """
     n_dof = len(joints)
     if isinstance(names, str):
         if NUMBER in names and names.replace(NUMBER, str(n_dof + 1)) in log.columns:
@@ -189,7 +206,11 @@ def _read_matrix(
 
 
 def _read_column(log: RawLog, name: str) -> FloatArray:
-    """Return a column of numbers, or raise DataError if there is none."""
+    """Return a column of numbers.
+
+    Raises:
+        DataError: The column is missing, too short, or holds entries that are no finite numbers.
+    """
     column = log.columns.get(name)
     if column is None and name in log.others:
         raise DataError(f"{log.source}: column {name} holds {log.others[name]}; use numbers.")

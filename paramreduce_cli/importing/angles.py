@@ -52,7 +52,10 @@ def find_near_angle(text: str) -> float | None:
 
 
 def _find_nearest(text: str) -> tuple[int, float | None]:
-    """Return the digits of a number after the point, and the nearest angle that so many digits can stand for."""
+    """Return the number of decimals of a number, and the simple fraction of pi that it may have been rounded from.
+
+    The fraction is None if the number is zero or has too few decimals.
+    """
     digits = -int(Decimal(text.strip()).as_tuple().exponent)
     parts = next((n for least, n in ((4, 12), (3, 4), (2, 2)) if digits >= least), None)
     whole = round(float(text) / (math.pi / parts)) if parts is not None else 0

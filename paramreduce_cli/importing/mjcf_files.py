@@ -114,7 +114,11 @@ class MjcfReader:
         return result
 
     def _read_robot(self) -> ImportedRobot:
-        """Return the robot with its links, joints and closures."""
+        """Return the robot with its links, joints and closures.
+
+        Raises:
+            ConfigError: The file has bodies that bend.
+        """
         model = self._model
         if model.nflex:
             raise ConfigError(
@@ -266,7 +270,11 @@ class MjcfReader:
         ]
 
     def _read_equalities(self) -> tuple[dict[str, Mimic], tuple[ImportedClosure, ...]]:
-        """Return the joints that follow others, and the closures."""
+        """Return the joints that follow others, and the closures.
+
+        Raises:
+            ConfigError: An equality has no rigid-body meaning.
+        """
         model, kinds = self._model, self._mujoco.mjtEq
         followers: dict[str, Mimic] = {}
         closures = []
@@ -303,7 +311,11 @@ class MjcfReader:
         return bool(on_bodies and any(model.body_mocapid[i] >= 0 for i in ids))
 
     def _read_coupling(self, k: int, name: str) -> tuple[str, Mimic]:
-        """Return the follower of an equality of joints, and how it follows."""
+        """Return the follower of an equality of joints, and how it follows.
+
+        Raises:
+            ConfigError: The coupling is not linear, or fixes a joint alone.
+        """
         model = self._model
         follower, leader = int(model.eq_obj1id[k]), int(model.eq_obj2id[k])
         offset, ratio, *higher = model.eq_data[k, :5].tolist()

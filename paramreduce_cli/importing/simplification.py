@@ -150,7 +150,7 @@ class _Simplification:
         self._frames: dict[str, FloatArray] = {}
 
     def _check_names(self) -> None:
-        """Raise ConfigError if the call names a link or joint that does not exist."""
+        """Raise ConfigError if an option names a link or joint that does not exist."""
         choice = self._choice
         links, joints = list(self._robot.links), [joint.name for joint in self._robot.joints]
         asked = [("--root", choice.root, links), ("--tip", choice.tip, links)]
@@ -164,7 +164,11 @@ class _Simplification:
                 raise ConfigError(f"{option} {name}: {UnknownNameError(kind, name, known)}")
 
     def _find_root(self) -> str:
-        """Return the link that no joint carries, or the link that the call names."""
+        """Return the link that no joint carries, or the link that ``--root`` names.
+
+        Raises:
+            ConfigError: Several links are carried by no joint, and none is named.
+        """
         if self._choice.root is not None:
             return self._choice.root
         carried = {joint.child for joint in self._robot.joints}
@@ -177,7 +181,11 @@ class _Simplification:
         return roots[0]
 
     def _lock_other_branches(self, tip: str) -> None:
-        """Lock the joints that are not on the path from the root to the tip."""
+        """Lock the joints that are not on the path from the root to the tip.
+
+        Raises:
+            ConfigError: The root does not carry the tip.
+        """
         above = {joint.child: joint for joint in self._robot.joints}
         chain, link = set(), tip
         while link != self._root:
@@ -192,7 +200,11 @@ class _Simplification:
             self._warnings.append(f"not on the way to {tip}, so locked at 0: {', '.join(beside)}")
 
     def simplify(self) -> SimplifiedRobot:
-        """Return the robot with fixed links merged, names made valid, and closures and couplings taken over."""
+        """Return the robot with fixed links merged, names made valid, and closures and couplings taken over.
+
+        Raises:
+            ConfigError: No joint is left that moves, or an option names what is not there.
+        """
         bodies: list[ImportedBody] = []
         inertials: dict[str, list[Inertial]] = {}
         if self._choice.floating:
@@ -247,7 +259,14 @@ class _Simplification:
         )
 
     def _list_closures(self) -> tuple[Closure, ...]:
-        """Return the closures of the file and of the call, without those of links that are left out."""
+        """Return the closures of the file and those of ``--close``, between bodies instead of links.
+
+        Closures of the file are left out, with a warning, where one of their links is left out or both move as one
+        body.
+
+        Raises:
+            ConfigError: A closure of ``--close`` has a link that is left out, or two that move as one body.
+        """
         found = []
         for closure in (*self._robot.closures, *self._asked_closures):
             left_out = [link for link in closure.links if link not in self._carried]
@@ -278,7 +297,11 @@ class _Simplification:
         couplings: tuple[Coupling, ...],
         closures: tuple[Closure, ...],
     ) -> tuple[str, ...]:
-        """Return the independent coordinates: those asked for, else those that the file leaves free."""
+        """Return the independent coordinates: those asked for, else those that the file leaves free.
+
+        Raises:
+            ConfigError: A coordinate that is asked for does not move, or options change a robot whose file has loops.
+        """
         choice = self._choice
         moved = {body.source.name: body for body in bodies if body.source is not None}
         if choice.independent or (self._asked_closures and not self._robot.closures):

@@ -98,7 +98,11 @@ class _Reader:
         return ConfigError(f"{self._path}, line {element.sourceline}: {shown} {text}.")
 
     def read_robot(self) -> ImportedRobot:
-        """Return the robot with its links and joints."""
+        """Return the robot with its links and joints.
+
+        Raises:
+            ConfigError: There are no links, or two have one name.
+        """
         links: dict[str, Inertial | None] = {}
         for element in self._root.findall("link"):
             name = self._get_name(element)
@@ -171,7 +175,11 @@ class _Reader:
         return tuple(steps)
 
     def _read_inertia(self, link: Any) -> Inertial | None:
-        """Return the inertia of a link, or None if it has none."""
+        """Return the inertia of a link, or None if it has none.
+
+        Raises:
+            ConfigError: The element lacks <mass> or <inertia>.
+        """
         element = link.find("inertial")
         if element is None:
             return None
@@ -186,7 +194,11 @@ class _Reader:
         )
 
     def _read_joint(self, element: Any, links: dict[str, Inertial | None]) -> ImportedJoint:
-        """Return a joint with its limits, drive and mimic."""
+        """Return a joint with its limits, drive and mimic.
+
+        Raises:
+            ConfigError: The type or a link is unknown, or the lower limit is above the upper one.
+        """
         name, kind = self._get_name(element), element.get("type")
         if kind not in _KINDS:
             raise self._make_error(element, f"has type={kind!r}; known are {', '.join(_KINDS)}")
@@ -270,7 +282,11 @@ class _Reader:
                 follower = by_name[follower.mimic.joint]
 
     def _read_axis(self, joint: Any, kind: str) -> tuple[float, float, float]:
-        """Return the axis of a joint with unit length."""
+        """Return the axis of a joint with unit length.
+
+        Raises:
+            ConfigError: The axis is zero.
+        """
         element = joint.find("axis")
         if element is None or kind in ("fixed", "floating"):
             return (1.0, 0.0, 0.0)

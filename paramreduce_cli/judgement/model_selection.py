@@ -79,7 +79,9 @@ def find_best_of_size(results: Mapping[str, HeuristicValidation], n: int) -> Pic
 def _find_smallest(
     results: Mapping[str, HeuristicValidation], picks: Sequence[Pick]
 ) -> Pick | None:
-    """Return the best model among those with the fewest parameters, or None if there are none."""
+    """Return the pick with the fewest parameters, of several the one with the smallest error on the validation set;
+    None if there are no picks.
+    """
     if not picks:
         return None
     n = min(int(results[name].n[row]) for name, row in picks)

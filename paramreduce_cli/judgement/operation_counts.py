@@ -23,7 +23,7 @@ Heuristics = Mapping[str, HeuristicValidation]
 
 
 class OperationCounts:
-    """A counter of the operations of reduced models.
+    """A counter of operations of reduced models.
 
     Args:
         model: Model of the robot.
@@ -59,7 +59,9 @@ class OperationCounts:
         return _insert_operations(heuristics, found)
 
     def count(self, heuristics: Heuristics, shown: Sequence[ModelChoice]) -> Heuristics:
-        """Return the validation of heuristics with the operations of some models, and of all that take the same."""
+        """Return the validation of heuristics with the numbers of operations of some models, and of all that have the
+        same structure.
+        """
         known = {
             self._structures[key]: (result.operations.inverse[row], result.operations.direct[row])
             for key in self._models

@@ -75,7 +75,9 @@ def select_model(
 def _choose_by_cross_validation(
     results: Mapping[str, HeuristicValidation], folds: Mapping[str, CrossValidation]
 ) -> tuple[str, int, str]:
-    """Return heuristic, row and reason of the model that cross-validation chooses."""
+    """Return the smallest model within one standard error of the best one in cross-validation: its heuristic, its row
+    and a sentence that says why.
+    """
     choice = choose_by_one_standard_error(folds)
     row = results[choice.heuristic].find_row(choice.n)
     assert row is not None  # only sizes of the heuristic itself are judged

@@ -63,7 +63,7 @@ def compute_joint_errors(parts: Sequence[Squares]) -> FloatArray:
 def compute_torque_errors(
     blocks: Iterable[Block], parameters: FloatArray, weights: FloatArray
 ) -> NormErrors:
-    """Return the errors of many models in one pass over the samples.
+    """Return the torque errors of many models, and the range of the states, in one pass over the samples.
 
     Args:
         blocks: The samples.

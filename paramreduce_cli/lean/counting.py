@@ -54,7 +54,7 @@ class Counts:
         return get_lean_models(self._model, independent=self._independent)
 
     def estimate(self, kept: BoolArray, *, direct: bool = False) -> int:
-        """Return nearly the operations of the lean inverse dynamics; it takes microseconds.
+        """Return about how many operations the lean inverse dynamics take, within microseconds.
 
         Args:
             kept: Mask of the standard parameters that are not zero, (n_standard,).
@@ -111,7 +111,7 @@ def count_all(
 
 
 def digest_structure(reduced: ReducedModel, model: Model) -> bytes:
-    """Return what the operations of a reduced model depend on: which parameters are kept, and which share a value."""
+    """Return a digest of what the number of operations depends on: which parameters are kept, and which share a value."""
     reduced = reduced.drop_unaffecting(model.affecting)
     ties = reduced.ties
     return bytes(str([ties.get(k, k) for k in reduced.kept.tolist()]), "ascii")

@@ -135,7 +135,9 @@ def _starts(direct: bool) -> tuple[JointFormulation, ...]:
 def _run_searches(
     mechanism: Mechanism, chains: Sequence[_SearchChain], jobs: int
 ) -> Iterator[tuple[_SearchChain, list[_Choices]]]:
-    """Yield each chain of searches with its results, in any order."""
+    """Run the chains of searches in processes; yield each with the formulations it has found, in the order in which
+    they end.
+    """
     pays = len(choose_frames(mechanism).joints) >= _MANY
     with start_workers(
         min(jobs, len(chains)) if pays else 1, partial(_return_mechanism, mechanism)
@@ -153,7 +155,7 @@ def _work(mechanism: Mechanism, chain: _SearchChain) -> list[_Choices]:
 
 
 def _run_chain(mechanism: Mechanism, chain: _SearchChain) -> list[_Choices]:
-    """Return the choices that each search of a chain ends with."""
+    """Return the formulations that each search of a chain ends with."""
     tree, build = choose_frames(mechanism), _build(chain.direct)
     choices, found = list(chain.start), []
     for dropped in chain.dropped:

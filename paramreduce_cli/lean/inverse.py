@@ -109,7 +109,9 @@ def _make_zero_inertia(body: Inertia) -> Inertia:
 
 @cache_expressions
 def select_part(body: Inertia, choice: JointFormulation, place: InertiaPlace) -> Inertia:
-    """Return the part of an inertia that is multiplied with the motion at a place."""
+    """Return the part of an inertia that a formulation multiplies with the motion at one recursion step; the rest is
+    zero.
+    """
     zero = body.m - body.m
 
     def kept(where: InertiaPlace, value: Scalar) -> Scalar:
@@ -129,7 +131,14 @@ def select_part(body: Inertia, choice: JointFormulation, place: InertiaPlace) ->
 
 
 def select_gauge(state: JointState, choice: JointFormulation, place: InertiaPlace) -> Gauge:
-    """Return the gauge that the moments of inertia have at a place."""
+    """Return which part of the inertia is handed to the parent body (its gauge) where the moments are computed at a
+    place.
+
+    Args:
+        place: Recursion step at which the moments are to be computed; steps other than the chosen one have no gauge.
+        state: State of the joint.
+        choice: Formulation chosen at the joint.
+    """
     if not (state.joint.revolute and choice.polar is choice.plane is place):
         return Gauge.NONE
     if place is InertiaPlace.OWN or choice.gauge is Gauge.FLAT:
@@ -143,8 +152,12 @@ def rotate_to_rest(wrench: Wrench, state: JointState) -> Wrench:
 
 
 def transfer_to_parent(wrench: Wrench, state: JointState) -> Wrench:
-    """Return a wrench of the frame at rest in the parent body's frame, about its origin; for joints that are not
-    aligned.
+    """Return a wrench in the parent body's frame, about that frame's origin; for joints whose axes are not those of the
+    parent.
+
+    Args:
+        wrench: Wrench in the joint's frame at rest, that of the body at q = 0, about its origin.
+        state: State of the joint.
     """
     turned = Wrench(
         state.rest_to_parent.to_parent(wrench.force), state.rest_to_parent.to_parent(wrench.moment)

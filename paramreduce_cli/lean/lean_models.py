@@ -177,7 +177,8 @@ class LeanModels:
         return LeanModels(replace(self._model, formulations=found), independent=self._projected)
 
     def estimate_operations(self, kept: IntArray, *, direct: bool = False) -> int:
-        """Return the approximate operations, quick enough to compare thousands of subsets.
+        """Return about how many operations the leanest formulation takes, quickly enough to compare thousands of
+        subsets.
 
         Args:
             kept: Indices of the parameters that are not zero.
@@ -195,7 +196,15 @@ class LeanModels:
     def _build_leanest(
         self, variants: _Variants, model: ReducedModel, constant: bool, rewritten: bool
     ) -> Program:
-        """Return the program with the fewest operations among all formulations."""
+        """Return the program with the fewest operations among the variants, one of each formulation, specialised to a
+        model.
+
+        Args:
+            variants: Programs of all formulations, for any model.
+            model: Model that says which parameters are kept, and which have one value.
+            constant: Whether values of parameters are constants of the program, not inputs.
+            rewritten: Whether programs are rewritten to save operations before they are compared.
+        """
         if not rewritten:
             return Program.from_graph(*self._choose_simplified(variants, model, constant)[0])
         return Program.from_graph(

@@ -77,7 +77,9 @@ def compute_inertial_wrench(body: Inertia, frame: FrameMotion, a: Vector, gauge:
 
 
 def _compute_spin_moment(body: Inertia, frame: FrameMotion, gauge: Gauge) -> Vector:
-    """Return I w' + w x (I w), with the products of w taken from U."""
+    """Return the moment I w' + w x (I w), with products of angular speeds taken from U = [w'] + [w][w] of the frame's
+    motion.
+    """
     U, step = frame.U, frame.steps
     x, y, z = _compute_diagonal_spin_moment(body, frame, gauge)
     return (

@@ -278,7 +278,7 @@ def combine_factors(factors: FloatArray, nominal_torque: FloatArray | None) -> F
 
 
 def decimate_blocks(blocks: Iterable[Block], every: int) -> Iterator[Block]:
-    """Yield one of so many samples of each trajectory."""
+    """Yield the blocks with every ``every``-th sample of each trajectory alone."""
     trajectory, start = -1, 0
     for block in blocks:
         if block.trajectory != trajectory:

@@ -34,7 +34,7 @@ class Orthogonaliser:
         self._rank = 0
 
     def compute_squared_lengths(self) -> FloatArray:
-        """Return the squared lengths of what is left of the columns, zero for dependent ones, (n,)."""
+        """Return the squared lengths of the columns after projection, zero for dependent ones, (n,)."""
         squared = np.einsum("ij,ij->j", self.X, self.X)
         squared[squared <= self._dependent**2] = 0.0
         return squared

@@ -59,7 +59,7 @@ class StatesInside:
         return float(self._coordinates.compute_distance(self._known).min())
 
     def draw(self, count: int, rng: np.random.Generator, *, corners: bool = False) -> States:
-        """Return q, dq and ddq, (count, n_q) each; fewer states if so many are not found.
+        """Return ``count`` random q, dq and ddq, (count, n_q) each; fewer if not enough are found.
 
         Args:
             count: Number of states.

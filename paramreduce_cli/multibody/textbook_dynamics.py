@@ -65,7 +65,8 @@ class PlainDynamics:
     def count_operations(
         self, model: ReducedModel, *, signs_free: bool = True, independent: bool = False
     ) -> tuple[int, int]:
-        """Return the operations of IDM and of [M | delta] of a model, with parameters as inputs.
+        """Return the numbers of operations of the inverse dynamics and of [M | delta] of a model, with parameters as
+        inputs.
 
         Args:
             model: Model that says which parameters are kept.

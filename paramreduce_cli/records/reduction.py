@@ -177,7 +177,11 @@ class Subsets(BySize):
     seconds: float
 
     def get_subset(self, n: int) -> IntArray:
-        """Return the columns of the subset of size n, (n,)."""
+        """Return the columns of the subset of size n, (n,).
+
+        Raises:
+            KeyError: There is no subset of this size.
+        """
         row = self.find_row(n)
         if row is None:
             raise KeyError(n)
@@ -208,7 +212,7 @@ class Proofs(BySize):
     """The proofs of the best subset of at most each size; arrays have one row per size."""
 
     units: tuple[IntArray, ...]
-    """Columns that were chosen as one, the most wanted first."""
+    """Groups of columns that were kept or dropped together, most of one column, the most preferred first."""
     subsets: tuple[IntArray, ...]
     """Column indices of the best subset found of at most each size."""
     torque_error: FloatArray

@@ -39,7 +39,7 @@ def group_columns(names: Sequence[str], ranks: IntArray, groups: Sequence[Group]
         names: Names of the standard parameters, (n_standard,).
         ranks: Their ranks of preference, (n_standard,); a tied group has that of its members
             where they agree, and comes last where not.
-        groups: Groups with members among them, each in one group at most.
+        groups: Subset with members among them, each in one group at most.
     """
     tied = {member: group for group in groups if group.tied for member in group.members}
     labels = list(dict.fromkeys(tied[n].name if n in tied else n for n in names))

@@ -1,6 +1,7 @@
-"""Base class of criteria: the score of a subset, and estimates of what adding or removing a unit does.
+"""Base class of criteria: the score of a subset, and estimates of what adding or removing a group does.
 
-Heuristics work on units, a column or a group each, numbered in order of preference; a subset is a tuple of units.
+Heuristics keep and drop groups: one column each, or several that belong together. Groups are numbered in order of
+preference; a subset is a tuple of these numbers.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from paramreduce_cli.records import FloatArray, IntArray
 from paramreduce_cli.reduction.fitting import Fit, fit
 from paramreduce_cli.reduction.problem import FULL_PRECISION, TIE, SelectionProblem, find_first_best
 
-Units = tuple[int, ...]
+Subset = tuple[int, ...]
 
 
 class Objective(ABC):
@@ -29,40 +30,40 @@ class Objective(ABC):
 
     def __init__(self, problem: SelectionProblem) -> None:
         self.problem = problem
-        self.units = problem.units
-        self.widths = np.array([unit.size for unit in self.units])
+        self.groups = problem.groups
+        self.widths = np.array([group.size for group in self.groups])
         self.single = bool((self.widths == 1).all())
 
     @cached_property
     def owner(self) -> IntArray:
-        """Unit of each column of ``problem.columns``, (n_candidates,)."""
+        """Group of each column of ``problem.columns``, (n_candidates,)."""
         return np.repeat(np.arange(self.widths.size), self.widths)
 
-    def average_by_unit(self, values: FloatArray) -> FloatArray:
-        """Return the mean over the columns of each unit, (n_units,)."""
+    def average_by_group(self, values: FloatArray) -> FloatArray:
+        """Return the mean over the columns of each group, (n_groups,)."""
         if self.single:
             return values
         return np.bincount(self.owner, values, self.widths.size) / self.widths
 
     @abstractmethod
-    def score(self, kept: Units) -> float:
+    def score(self, kept: Subset) -> float:
         """Return the quantity that the criterion minimises."""
 
     @abstractmethod
-    def estimate_gains(self, kept: Units) -> FloatArray:
-        """Return the benefit of adding each unit, per column, (n_units,); -inf if the unit must not be added or was not
+    def estimate_gains(self, kept: Subset) -> FloatArray:
+        """Return the benefit of adding each group, per column, (n_groups,); -inf if the group must not be added or was not
         evaluated. Higher is better; only comparisons count.
         """
 
     @abstractmethod
-    def estimate_losses(self, kept: Units) -> FloatArray:
-        """Return the cost of removing each unit, per column, (n_units,); inf if the unit must not be removed or was not
+    def estimate_losses(self, kept: Subset) -> FloatArray:
+        """Return the cost of removing each group, per column, (n_groups,); inf if the group must not be removed or was not
         evaluated.
         """
 
     @abstractmethod
-    def swap_best(self, kept: Units) -> Units:
-        """Return the subset after the best swap of one unit for another of the same width, or the subset itself if no
+    def swap_best(self, kept: Subset) -> Subset:
+        """Return the subset after the best swap of one group for another of the same width, or the subset itself if no
         swap helps.
 
         The subset itself where none is promising.
@@ -75,31 +76,31 @@ class Objective(ABC):
 
     @property
     def cheap(self) -> Objective | None:
-        """A criterion that is quicker to search with and whose subsets are good starts."""
+        """A criterion that is quicker to search with and whose subsets are good starts, or None."""
         return None
 
     def fit(self, subset: IntArray) -> Fit:
         """Fit the parameters of a subset of columns."""
         return fit(self.problem, subset)
 
-    def list_columns(self, kept: Units) -> IntArray:
+    def list_columns(self, kept: Subset) -> IntArray:
         """Return the columns of a subset, in the order in which they were added."""
-        return np.concatenate([np.zeros(0, np.int64), *(self.units[u] for u in kept)])
+        return np.concatenate([np.zeros(0, np.int64), *(self.groups[u] for u in kept)])
 
-    def count_columns(self, kept: Units) -> int:
+    def count_columns(self, kept: Subset) -> int:
         """Return the number of a subset's columns."""
         return len(kept) if self.single else int(self.widths[list(kept)].sum())
 
-    def find_units(self, columns: IntArray) -> Units:
-        """Return the units of a subset of columns, in their order."""
-        owner = {int(c): k for k, unit in enumerate(self.units) for c in unit}
+    def find_groups(self, columns: IntArray) -> Subset:
+        """Return the groups of a subset of columns, in their order."""
+        owner = {int(c): k for k, group in enumerate(self.groups) for c in group}
         return tuple(dict.fromkeys(owner[int(c)] for c in columns))
 
-    def add_best(self, kept: Units, most: int) -> Units:
-        """Return the subset with the most beneficial unit added, or the subset itself if no unit may be added.
+    def add_best(self, kept: Subset, most: int) -> Subset:
+        """Return the subset with the most beneficial group added, or the subset itself if no group may be added.
 
         Args:
-            kept: Subset of units.
+            kept: Subset of groups.
             most: Largest number of columns that the new subset may have.
         """
         room = most - self.count_columns(kept)
@@ -111,13 +112,13 @@ class Objective(ABC):
         best = find_first_best(gains)
         return (*kept, best) if gains[best] > -np.inf else kept
 
-    def remove_worst(self, kept: Units) -> Units:
-        """Return the subset without the unit whose removal costs least; of equal units the least preferred is removed."""
+    def remove_worst(self, kept: Subset) -> Subset:
+        """Return the subset without the group whose removal costs least; of equal groups the least preferred is removed."""
         losses = self.estimate_losses(kept)
-        return remove_unit(kept, losses.size - 1 - find_first_best(-losses[::-1]))
+        return remove_group(kept, losses.size - 1 - find_first_best(-losses[::-1]))
 
-    def improve(self, kept: Units) -> tuple[Units, float]:
-        """Swap units until no swap improves the score; return the subset and its score."""
+    def improve(self, kept: Subset) -> tuple[Subset, float]:
+        """Swap kept and dropped groups of columns until no swap improves the score; return the subset and its score."""
         score = self.score(kept)
         while True:
             other = self.swap_best(kept)
@@ -127,6 +128,6 @@ class Objective(ABC):
             kept, score = other, value
 
 
-def remove_unit(kept: Units, unit: int) -> Units:
-    """Return a subset without one of its units."""
-    return tuple(u for u in kept if u != unit)
+def remove_group(kept: Subset, group: int) -> Subset:
+    """Return a subset without one of its groups."""
+    return tuple(u for u in kept if u != group)

@@ -25,7 +25,7 @@ class SelectionProblem:
         chi: (k,)
         candidates: Columns that may be chosen, in ascending order.
         preference: All columns, the most wanted first; it breaks every tie.
-        groups: Sets of columns that are chosen or left out together; all others stand alone.
+        joined: Sets of several columns that are kept or dropped together; every other column is a group alone.
         certifiable: Whether round-off leaves no doubt about which columns have an effect.
     """
 
@@ -33,7 +33,7 @@ class SelectionProblem:
     chi: FloatArray
     candidates: IntArray
     preference: IntArray
-    groups: tuple[IntArray, ...] = ()
+    joined: tuple[IntArray, ...] = ()
     certifiable: bool = True
 
     def replace_data(self, factor: FloatArray) -> SelectionProblem:
@@ -47,12 +47,12 @@ class SelectionProblem:
         return self.preference[np.isin(self.preference, self.candidates)]
 
     @cached_property
-    def units(self) -> list[IntArray]:
-        """Units of the selection, candidates alone or in groups, the most preferred first.
+    def groups(self) -> list[IntArray]:
+        """Groups of columns that are kept or dropped together, most of one column, the most preferred first.
 
         A group stands where its most preferred member does, with its members in order of preference.
         """
-        owner = {int(column): k for k, group in enumerate(self.groups) for column in group}
+        owner = {int(column): k for k, group in enumerate(self.joined) for column in group}
         found: dict[int, list[int]] = {}
         for column in self.candidates_by_preference.tolist():
             found.setdefault(owner.get(column, -1 - column), []).append(column)
@@ -60,8 +60,8 @@ class SelectionProblem:
 
     @cached_property
     def columns(self) -> IntArray:
-        """Columns of all units, one unit after the other, (n_candidates,)."""
-        return np.concatenate([np.zeros(0, np.int64), *self.units])
+        """Columns of all groups, one group after the other, (n_candidates,)."""
+        return np.concatenate([np.zeros(0, np.int64), *self.groups])
 
     @cached_property
     def _normalised(self) -> tuple[FloatArray, FloatArray]:

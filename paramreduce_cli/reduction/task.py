@@ -11,7 +11,7 @@ import numpy as np
 
 from paramreduce_cli.records import WHOLE, IntArray, Part, Progress, Proofs
 from paramreduce_cli.reduction.heuristics import heuristics
-from paramreduce_cli.reduction.objective import Objective, Units
+from paramreduce_cli.reduction.objective import Objective, Subset
 
 
 @dataclass(frozen=True)
@@ -83,18 +83,18 @@ def run(heuristic: str, task: SelectionTask) -> FoundSubsets:
     return task.known[asked]
 
 
-def make_nested(task: SelectionTask, order: Units) -> FoundSubsets:
-    """Return the nested subsets that an order of all units passes through."""
+def make_nested(task: SelectionTask, order: Subset) -> FoundSubsets:
+    """Return the nested subsets that an order of all groups passes through."""
     columns = task.objective.list_columns(order)
     ends = np.cumsum(task.objective.widths[list(order)]).tolist()
     return FoundSubsets(tuple(columns[:end] for end in ends if end <= task.limit))
 
 
-def append_others(objective: Objective, kept: Units) -> Units:
-    """Return a subset with all other units after it, in order of preference."""
-    return (*kept, *(u for u in range(len(objective.units)) if u not in kept))
+def append_others(objective: Objective, kept: Subset) -> Subset:
+    """Return a subset with all other groups after it, in order of preference."""
+    return (*kept, *(u for u in range(len(objective.groups)) if u not in kept))
 
 
-def sort_by_size(objective: Objective, subsets: Iterable[Units]) -> FoundSubsets:
+def sort_by_size(objective: Objective, subsets: Iterable[Subset]) -> FoundSubsets:
     """Return subsets in order of their number of columns."""
     return FoundSubsets(tuple(sorted((objective.list_columns(kept) for kept in subsets), key=len)))

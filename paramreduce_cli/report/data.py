@@ -148,7 +148,7 @@ def find_first_motion(
     Args:
         blocks: Blocks of the set.
         model: Reduced model.
-        most: Largest number of samples; longer trajectories are decimated by 2, 4, ... until they fit.
+        most: Number of samples; motions with more than twice as many are decimated by 2, 4, ...
     """
     parts: list[Block] = []
     every, seen = 1, 0

@@ -49,11 +49,13 @@ def make_data_frame(
 
 @singledispatch
 def _list_rows(record: Any) -> Iterator[Row]:
+    """Yield the rows of the table of a record, values by the names of the columns; raise TypeError if it has no table."""
     raise TypeError(f"no table is made of a {type(record).__name__}")
 
 
 @_list_rows.register
-def _(record: Model) -> Iterator[Row]:
+def _list_standard_parameters(record: Model) -> Iterator[Row]:
+    """Yield a row for each standard parameter."""
     known = zip(
         record.mechanism.parameters, record.values.tolist(), record.affecting.tolist(), strict=True
     )
@@ -63,7 +65,8 @@ def _(record: Model) -> Iterator[Row]:
 
 
 @_list_rows.register
-def _(record: Trajectories) -> Iterator[Row]:
+def _list_trajectories(record: Trajectories) -> Iterator[Row]:
+    """Yield a row for each trajectory: set, number, and the numbers and texts of its record."""
     for which in SETS:
         for k, trajectory in enumerate(getattr(record, which), 1):
             values = {f.name: getattr(trajectory, f.name) for f in fields(trajectory)}
@@ -72,7 +75,8 @@ def _(record: Trajectories) -> Iterator[Row]:
 
 
 @_list_rows.register
-def _(record: Reduction) -> Iterator[Row]:
+def _list_subsets(record: Reduction) -> Iterator[Row]:
+    """Yield a row for each subset of each heuristic: its size, torque error and columns."""
     for name, found in record.heuristics.items():
         for k, n in enumerate(found.n.tolist()):
             kept = tuple(record.columns.names[c] for c in sorted(found.subsets[k].tolist()))
@@ -81,7 +85,8 @@ def _(record: Reduction) -> Iterator[Row]:
 
 
 @_list_rows.register
-def _(record: Validation) -> Iterator[Row]:
+def _list_errors(record: Validation) -> Iterator[Row]:
+    """Yield a row for each subset of each heuristic: its size, errors, mass matrix and operations."""
     for name, judged in record.heuristics.items():
         columns = {
             "n": judged.n,
@@ -107,14 +112,16 @@ def _summarise_motions(errors: FloatArray) -> Iterator[tuple[str, float]]:
 
 
 @_list_rows.register
-def _(record: ReducedModel) -> Iterator[Row]:
+def _list_model_parameters(record: ReducedModel) -> Iterator[Row]:
+    """Yield a row for each parameter of a reduced model: name, value and what is lumped in it."""
     expressions = record.expressions or record.names
     for name, value, text in zip(record.names, record.values.tolist(), expressions, strict=True):
         yield {"name": name, "value": value, "stands_for": text}
 
 
 @_list_rows.register
-def _(record: Identification) -> Iterator[Row]:
+def _list_identified_parameters(record: Identification) -> Iterator[Row]:
+    """Yield a row for each identified parameter of the full and of the reduced model."""
     for which in ("full", "reduced"):
         found = getattr(record, which)
         columns = (found.names, found.values.tolist(), found.deviations.tolist())

@@ -188,7 +188,8 @@ def _pack_motion(data: ReportData, shown: IntArray) -> dict[str, Any]:
 
 
 def _pack_animation(data: ReportData) -> dict[str, Any] | None:
-    """Return the mechanism along its motions: points in the base frame, and lines between them by body.
+    """Return the mechanism along its motions, points in the base frame and lines between them by body; None without a
+    robot.
 
     Coordinates are embedded as shares of the box that they move in, in 16 bits: a step is
     much less than a pixel.

@@ -105,11 +105,11 @@ def _make_archive(files: Mapping[str, bytes]) -> str:
 def render_sweep(
     title: str, records: Sequence[Mapping[str, Any]], tables: Sequence[Table], figure: bytes
 ) -> str:
-    """Return many runs as one HTML page.
+    """Return an HTML page about many runs: their count, robots, tables and a figure.
 
     Args:
         title: Heading of the page.
-        records: Rows of the runs.
+        records: One record of numbers per run; only their number and robots are shown.
         tables: Tables to show.
         figure: SVG of all runs.
     """

@@ -108,9 +108,10 @@ def placed(
 
 
 def get_place(function: Callable[..., Any]) -> PagePlace:
-    """Return where a figure or a table stands on the page.
+    """Return the place on the page that ``placed`` has given a figure or a table.
 
     Raises:
+        TypeError: The function is not decorated with ``placed``.
         TypeError: It does not say so.
     """
     place = getattr(function, "place", None)

@@ -51,7 +51,7 @@ def draw_signals(data: ReportData, shown: ShownSignals, columns: Sequence[Column
 
 
 def _shade(axes: Axes, shown: ShownSignals) -> None:
-    """Shade what is held out, and what is cut off at the ends."""
+    """Shade the held-out part, and the ends that are cut off."""
     bounds = np.concatenate([shown.learned, shown.held_out])
     bounds = bounds[np.isfinite(bounds)]
     ends = (

@@ -16,7 +16,7 @@ _LISTED = 40
 def make_run_record(
     name: str, summary: Summary, variant: str = "", seed: int | None = None
 ) -> dict[str, Any]:
-    """Return one run as one row of numbers; None where a number is not known.
+    """Return the numbers of one run by name; None where a number is not known.
 
     Args:
         name: Name of the run.

@@ -98,7 +98,9 @@ def _summarise_leanest(leanest: Mapping[str, Leanest]) -> dict[str, Any]:
 
 
 def _summarise_model(model: Model) -> dict[str, Any]:
-    """Return the numbers of the model."""
+    """Return the numbers of joints, parameters and base parameters of a model, its rank gap and the names of its
+    parameters.
+    """
     return {
         "n_dof": model.mechanism.n_dof,
         "n_parameters": model.values.size,
@@ -111,7 +113,7 @@ def _summarise_model(model: Model) -> dict[str, Any]:
 
 
 def _summarise_columns(reduction: Reduction) -> dict[str, Any]:
-    """Return the numbers of a user-supplied observation matrix, in place of a model's."""
+    """Return the summary of a user-supplied observation matrix, which takes the place of a model's."""
     return {
         "n_dof": reduction.nominal_torque.size,
         "n_parameters": len(reduction.columns.names),
@@ -289,7 +291,7 @@ def _summarise_trajectory(t: Trajectory) -> dict[str, Any]:
 
 
 def _find_first_beyond_rank(subsets: Subsets) -> int | None:
-    """Return the smallest size that is fitted with minimum norm."""
+    """Return the smallest size that is fitted with minimum norm, or None."""
     beyond = subsets.n[subsets.minimum_norm]
     return int(beyond[0]) if beyond.size else None
 

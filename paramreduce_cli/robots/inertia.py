@@ -16,7 +16,11 @@ _TENSOR = (Kind.IXX, Kind.IXY, Kind.IXZ, Kind.IYY, Kind.IYZ, Kind.IZZ)
 
 
 def _take_upper_triangle(value: Any) -> Any:
-    """Return the six elements of a tensor that may be written as a symmetric matrix."""
+    """Return the six elements of a tensor that may be written as a symmetric matrix.
+
+    Raises:
+        ValueError: The matrix is not symmetric.
+    """
     rows = isinstance(value, list) and len(value) == 3 and all(isinstance(r, list) for r in value)
     if not rows or any(len(row) != 3 for row in value):
         return value

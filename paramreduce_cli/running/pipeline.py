@@ -126,7 +126,11 @@ def _describe_input(name: str, hint: Any, parameter: str = "") -> StageInput:
 
 @cache
 def list_stages() -> tuple[Stage, ...]:
-    """Return all stages, each after the stages whose artifacts it reads."""
+    """Return all stages, each after the stages whose artifacts it reads.
+
+    Raises:
+        ValueError: Stages read one another's artifacts in a circle.
+    """
     waiting = [describe_stage(name, function) for name, function in stages.items()]
     ordered: list[Stage] = []
     made: set[type] = set()
@@ -204,7 +208,11 @@ def check_is_part(stage: Stage, config: Config) -> None:
 
 
 def list_stages_to_run(config: Config) -> list[Stage]:
-    """Return the stages of a full run; trajectories are left out if both sets are recorded or simulated."""
+    """Return the stages of a full run in order, without those that have nothing to do for a config.
+
+    No trajectories are optimised if the states come from recordings, a log or a simulation; logs, identification and
+    terms need their own inputs and sections.
+    """
     logged = config.sampling.log is not None
     simulated = config.sampling.simulation is not None
     recorded = logged or simulated or _is_recorded(config)

@@ -393,7 +393,9 @@ class Runner:
         )
 
     def _make_provenance(self) -> Provenance:
-        """Return the provenance of the results in the folder."""
+        """Return the provenance of the results in the folder: config, versions, and seconds and warnings of each
+        finished stage but the report.
+        """
         seconds, warnings = {}, {}
         for stage in list_stages():
             stamp = self.store.read_stamp(stage.output)

@@ -45,6 +45,9 @@ def build_model(robot: Robot, model: ModelSection, run: Run) -> Model:
 
     The ranks are decided on seeded random states. An interruption leaves nothing: it takes less than
     a minute for thirty joints.
+
+    Raises:
+        ConfigError: The nominal torque of a joint is zero and the config gives none.
     """
     mechanism = assemble(robot.build_mechanism())
     rng = np.random.default_rng(_SEED)

@@ -46,6 +46,9 @@ def identify(
     """Identify base parameters and those of the selected model, with standard deviations.
 
     Also physically consistent standard parameters, and hints where residuals are not noise.
+
+    Raises:
+        DataError: The samples have no validation set.
     """
     if samples.validation is None:
         raise DataError("samples.h5 holds no validation set.", command="sample")

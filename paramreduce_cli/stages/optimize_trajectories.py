@@ -163,7 +163,11 @@ def _find_point_to_point(
 def _evaluate_coefficients(
     section: TrajectoriesSection, model: Model, task: ExcitationTask, coefficients: Coefficients
 ) -> dict[str, tuple[Trajectory, ...]]:
-    """Return the trajectories of user-supplied coefficients, evaluated but not changed."""
+    """Return the trajectories of user-supplied coefficients, evaluated but not changed.
+
+    Raises:
+        DataError: The coefficients are for another number of joints.
+    """
     excitation = build_excitation(task)
 
     def measure(entry: FloatArray) -> Trajectory:
@@ -197,7 +201,11 @@ def _evaluate_coefficients(
 def _check_motion(
     source: str, name: str, trajectories: tuple[Trajectory, ...], limits: JointLimits
 ) -> None:
-    """Refuse trajectories in which nothing moves; warn of joints that rest or go too far."""
+    """Refuse trajectories in which nothing moves; warn of joints that rest or go too far.
+
+    Raises:
+        DataError: Nothing moves in one of the trajectories.
+    """
     moving = np.array([t.reach > 0 for t in trajectories])
     if not moving.any(axis=1).all():
         raise DataError(f"{source}: nothing moves in one of the {name} trajectories.")

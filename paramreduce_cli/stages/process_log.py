@@ -28,6 +28,9 @@ def process_log(
     """Process logs: clean, filter, differentiate and split them.
 
     What was done to them, and what looks wrong in them, is part of the result.
+
+    Raises:
+        ConfigError: The config names no log.
     """
     if log is None:
         raise make_no_log_error()

@@ -65,6 +65,9 @@ def reduce(
     are not zero take part. Ctrl-C ends the search for proofs, and what is proven is kept; the
     same command goes on from there. The items are the proofs of the sizes; jobs may also split the
     search for every size.
+
+    Raises:
+        DataError: The samples are of another robot, or too few.
     """
     if model is not None and model.mechanism.parameter_names != tuple(samples.names):
         raise DataError(
@@ -186,7 +189,11 @@ def _make_criterion_inputs(
     samples: Samples,
     columns: Columns,
 ) -> CriterionInputs:
-    """Return the inputs of criteria, computed when a criterion asks for them."""
+    """Return the inputs of criteria, computed when a criterion asks for them.
+
+    Raises:
+        DataError: A criterion needs a model, or nominal accelerations, and there are none.
+    """
 
     def modelled(criterion: str) -> Model:
         if model is None:
@@ -276,7 +283,11 @@ def _make_task(
 def _run_heuristic(
     task: SelectionTask, method: SelectionMethod, stop: Stop
 ) -> tuple[_Selected, Proofs | None]:
-    """Return the subsets and fits of a heuristic, and its proofs if it makes any."""
+    """Return the subsets and fits of a heuristic, and its proofs; None for the proofs of heuristics that make none.
+
+    Raises:
+        ConfigError: With groups no subset is as small as the config asks for.
+    """
     started = time.perf_counter()
     found = run_heuristic(method.heuristic, task)
     seconds = time.perf_counter() - started

@@ -235,7 +235,11 @@ def _draw_skeletons(
 
 
 def _choose_poses(section: ReportSection, model: Model, motion: ShownMotion) -> list[FloatArray]:
-    """Return the poses that the config names, or some along the motion."""
+    """Return the poses that the config names, or some along the motion.
+
+    Raises:
+        ConfigError: A pose of the config cannot be used.
+    """
     if section.poses is not None:
         wanted = [expand_per_joint(pose, model.mechanism.n_dof) for pose in section.poses]
         coordinates = Coordinates(model.mechanism, once=True)

@@ -75,6 +75,10 @@ def sample(
 
     From the optimised trajectories, or from a log or recorded states where the config names them. The
     items are trajectories, or pieces of a recording.
+
+    Raises:
+        DataError: A set has neither a recording nor a trajectory.
+        ConfigError: ``--part`` is given for a log, which is sampled as a whole.
     """
     items = items or Items()
     if sampling.log is not None and not items.part.is_whole:
@@ -234,7 +238,11 @@ def _sample_series(
 def _sample_recording(
     sampling: SamplingSection, model: Model, dynamics: Dynamics, recording: Recording
 ) -> ObservedSet:
-    """Return the samples of a recording of states, with measured torques or torques of the model."""
+    """Return the samples of a recording of states, with measured torques or torques of the model.
+
+    Raises:
+        ConfigError: Measured torques are asked for, and the recording has none.
+    """
     _warn_of_still_joints(model, recording)
     if sampling.torques == "model":
         recording = replace(recording, tau=None)
@@ -261,7 +269,12 @@ def _sample_recording(
 
 
 def _sample_log(model: Model, dynamics: Dynamics, log: MeasuredLog | None, name: str) -> LoggedSet:
-    """Return the samples of a processed log."""
+    """Return the samples of a processed log.
+
+    Raises:
+        ConfigError: The low-pass is longer than the motion.
+        DataError: There is no processed log.
+    """
     if log is None:
         raise DataError("there is no log.h5.", command="process-log")
     motions = log.training if name == "estimation" else log.held_out
@@ -283,7 +296,11 @@ def _sample_simulation(
     name: str,
     report_progress: ProgressCallback,
 ) -> ObservedSet:
-    """Return the samples of simulated motions of the full model under the config's inputs."""
+    """Return the samples of simulated motions of the full model under the config's inputs.
+
+    Raises:
+        ConfigError: The simulation fails; the message says at what time.
+    """
     mechanism = model.mechanism
     rng = np.random.default_rng([0, zlib.crc32(name.encode())])
     time = np.arange(0.0, section.duration, section.step)
@@ -333,7 +350,11 @@ def _read_motion_states(motions: list[SimulatedMotion]) -> StatesAt:
 
 
 def _compute_measured_torques(model: Model, source: str, tau: FloatArray) -> FloatArray:
-    """Return recorded torques, zero where none are measured."""
+    """Return recorded torques, zero where none are measured.
+
+    Raises:
+        DataError: Torques of a joint are missing or not finite.
+    """
     wanted = np.isfinite(model.nominal_torque)
     for j in np.flatnonzero(wanted & np.isnan(tau).any(axis=0)).tolist():
         lost = np.flatnonzero(np.isnan(tau[:, j]))
@@ -356,7 +377,10 @@ def _iterate_states(series: list[FloatArray], period: float, points: int, finer:
 
     @lru_cache
     def basis(harmonics: int, count: int) -> tuple[FourierBasis, FourierBasis | None]:
-        """Return the series at the first samples; later samples differ in their coefficients alone."""
+        """Return the series at the first samples, and on the finer grid, None if there is none.
+
+        Later samples differ in their coefficients alone.
+        """
         return (
             evaluate_basis(period, harmonics, times[:count]),
             evaluate_basis(period, harmonics, finer_times[: finer * count]) if finer > 1 else None,

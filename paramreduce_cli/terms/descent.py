@@ -263,7 +263,7 @@ def continue_on_samples(
 
 
 def find_leanest_histories(histories: Iterable[SearchHistory], number: int) -> list[SearchHistory]:
-    """Return the histories with the leanest different ends, so many at most."""
+    """Return at most ``number`` histories, those with the fewest operations at their ends, one of each different end."""
     different: dict[tuple[int, float], SearchHistory] = {}
     for way in histories:
         different.setdefault(way.rank, way)

@@ -127,7 +127,7 @@ class Evaluator:
         return np.array([of_joints.min(axis=2), of_joints.max(axis=2)])
 
     def decimate(self, part: SampleSet, most: int) -> TermSamples:
-        """Return so many samples of a set at most, evenly spread."""
+        """Return at most ``number`` samples of a set, evenly spread."""
         return self._make_samples(
             decimate_blocks(part.iterate_blocks(), -(-part.n_samples // most))
         )
@@ -258,7 +258,7 @@ class Evaluator:
         return StatesInside(self._model.mechanism, lower, upper, self._constraints, known)
 
     def _sample_states(self, count: int) -> Iterator[States]:
-        """Yield so many random states, some at a time; fewer if loops are hard to assemble."""
+        """Yield random states in portions; fewer than asked for if loops are hard to assemble."""
         count = count if self._model.mechanism.loops is None else _OF_LOOPS
         for start in range(0, count, _AT_ONCE):
             some = self._inside.draw(min(_AT_ONCE, count - start), self._rng)

@@ -222,7 +222,17 @@ def compute_effects(
     kept_values: FloatArray,
     adjoints: FloatArray,
 ) -> FloatArray:
-    """Return the contribution of each term to the quantities, (n_candidates, n_quantities * n_samples)."""
+    """Return the value of each candidate times the derivatives of the quantities: to first order what they lose without
+    it, (n_candidates, n_quantities * n_samples).
+
+    Args:
+        v: Values of all nodes at the samples, (n_nodes, n_samples).
+        kept_values: Values of all nodes as written, before they are replaced by others, (n_nodes, n_samples).
+        adjoints: Derivatives of the quantities by the nodes, (n_nodes, n_quantities, n_samples).
+        candidates: Node and what goes of it, the whole or an operand, (n_candidates, 2).
+        program: The program.
+        pruning: What has been removed from it already.
+    """
     operands = program.operands
     kept, source, factor = pruning
     _, quantities, m = adjoints.shape

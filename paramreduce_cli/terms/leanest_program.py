@@ -153,7 +153,7 @@ def _descend_further(
     patience: int,
     meter: _ProgressMeter,
 ) -> list[SearchHistory]:
-    """Make further descents, while in time, until so many in a row have improved nothing.
+    """Make further descents, while in time, until a number of them in a row have improved nothing.
 
     Args:
         working: Makes them.
@@ -194,6 +194,8 @@ def _list_first(searcher: Searcher, starts: Iterable[Start]) -> list[Descent]:
 
 
 def _estimate_work(searcher: Searcher, descents: Sequence[Descent]) -> float:
-    """Return the operations times torques of a program, averaged over descents."""
+    """Return the number of operations times that of torques, averaged over descents: a measure of how long a descent
+    takes.
+    """
     torques = searcher.search_samples.samples.tau.shape[0]
     return float(np.mean([max(one.visited) for one in descents]) * torques)

@@ -92,13 +92,15 @@ class Searcher:
         return _descend(self.start_descent(start, what.seed_index), rng)
 
     def repeat_descent(self, what: Restart) -> SearchHistory | None:
-        """Descend from a program shortly before the end of a descent, written in another way."""
+        """Descend from a program shortly before the end of a descent, written in another way; return None if that
+        program exceeds the budget.
+        """
         rng = np.random.default_rng([self.seed, what.seed_index, 2])
         searching = self._make_search(what.history.start, self.search_samples, what.seed_index)
         return _descend(Descent.restart(what.history, rng, searching), rng)
 
     def descend_closely(self, history: SearchHistory) -> SearchHistory | None:
-        """Continue a descent with more samples."""
+        """Continue a descent with more samples; return None if no program on the way is within the budget there."""
         return continue_on_samples(history, self._make_search(history.start, self.closely))
 
     def _make_search(
@@ -173,7 +175,7 @@ def _work_in_time(
     searcher: Searcher,
     numbered: tuple[int, Item],
 ) -> tuple[bool, SearchHistory | None]:
-    """Return whether an item was started before the deadline, as the first one always is, and its result."""
+    """Return whether an item was started before the deadline, as the first one always is, and its result; None if not."""
     number, item = numbered
     if number and time.monotonic() > deadline:
         return False, None
@@ -187,7 +189,7 @@ def start_searchers(
     on_descent: Callable[[SearchHistory | None], None],
     deadline: float = math.inf,
 ) -> Iterator[WorkerGroup]:
-    """Start so many processes for a searcher, or none; without a deadline results do not depend on their number."""
+    """Start processes for a searcher, or none for one job; without a deadline results do not depend on their number."""
     with start_workers(jobs, partial(_same, searcher)) as pool:
         yield WorkerGroup(on_descent, deadline, pool)
 

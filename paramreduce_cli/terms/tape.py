@@ -225,7 +225,7 @@ class Tape:
         return int(kernels.count_operations(self._instructions, pruning))
 
     def count_flipped(self, pruning: Pruning, candidates: IntArray) -> IntArray:
-        """Return the operations after flipping each candidate, (n_candidates,).
+        """Return the number of operations after flipping each candidate, (n_candidates,).
 
         Nodes that stand for themselves and could only stand for others stay as they are.
         """
@@ -237,7 +237,7 @@ class Tape:
     def count_replaced(
         self, pruning: Pruning, nodes: IntArray, sources: IntArray, factors: FloatArray
     ) -> IntArray:
-        """Return the operations after replacing one more node by a multiple of another, (n_replacements,)."""
+        """Return the number of operations after replacing one more node by a multiple of another, (n_replacements,)."""
         return kernels.count_replaced(
             self._instructions, pruning,
             nodes, sources, factors,

@@ -35,7 +35,7 @@ NOISE = 0.3
 
 @dataclass(frozen=True)
 class Step:
-    """A program on the way, with the operations that it takes."""
+    """A program on the way down, with its number of operations."""
 
     fit: TermFit
     count: int
@@ -188,7 +188,7 @@ class TermSearch:
         return self._step(min(tried, key=lambda entry: entry[:2])[2]) if tried else None
 
     def _find_useful(self, step: Step) -> tuple[IntArray, FloatArray]:
-        """Return the numbers of terms whose removal saves operations, and the operations saved."""
+        """Return the indices of the terms whose removal saves operations, and the number of operations each saves."""
         pruning = step.fit.pruning
         # That a node is itself is no term to be left out: see stand-ins.
         numbers = np.flatnonzero(self._droppable & pruning.has(self._candidates))

@@ -7,12 +7,12 @@ _MOST_DECIMALS = 7
 
 
 def format_measured(value: float, deviation: float | None) -> tuple[str, str]:
-    """Return a value and its standard deviation as text, with two digits of the deviation and as many decimals of the
-    value.
+    """Return a value and its standard deviation as text: two significant digits of the deviation, and as many decimals
+    of the value.
 
     Args:
         value: The value.
-        deviation: Standard deviation; if it is None or not finite, the value has six digits.
+        deviation: Standard deviation. If it is None, zero or not finite, the value has six significant digits.
 
     Returns:
         Text of the value and of the deviation, which is empty if there is none.

@@ -94,7 +94,7 @@ def main():
         objective = TorqueObjective(p)
 
         def error(subset, objective=objective):
-            return objective.score(objective.find_units(np.asarray(subset)))
+            return objective.score(objective.find_groups(np.asarray(subset)))
 
         run("best-subset", SelectionTask(TorqueObjective(p), 2))  # compile
         reference = None

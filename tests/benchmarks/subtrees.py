@@ -35,7 +35,7 @@ def jobs_of(seed, n, count):
     subset = run("swap", SelectionTask(objective, largest=n)).subsets[n - 1]
     place = {int(column): k for k, column in enumerate(scaled.columns)}
     start = np.array([place[int(c)] for c in subset])
-    error = objective.score(objective.find_units(subset)) ** 2
+    error = objective.score(objective.find_groups(subset)) ** 2
 
     def search(log):
         return Search(scaled, n, error, start, log=log)

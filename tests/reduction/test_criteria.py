@@ -65,7 +65,7 @@ def test_the_fit_minimises_the_exact_acceleration_error(arm):
     subset = heuristics["swap"](SelectionTask(objective.cheap)).subsets[11]
     fitted = objective.fit(subset).parameters
     error = arm.acceleration_error(subset, fitted)
-    assert objective.score(objective.find_units(subset)) == pytest.approx(error, rel=1e-3)
+    assert objective.score(objective.find_groups(subset)) == pytest.approx(error, rel=1e-3)
     best = scipy.optimize.least_squares(
         lambda scale: [arm.acceleration_error(subset, fitted * scale)], np.ones(subset.size)
     )
@@ -79,7 +79,7 @@ def test_accelerations_choose_better_subsets_than_torques(arm):
     torque = {s.size: s for s in heuristics["swap"](SelectionTask(objective.cheap, 12)).subsets}
     better = 0
     for n in range(8, 13):
-        one, two = (objective.score(objective.find_units(s[n])) for s in (own, torque))
+        one, two = (objective.score(objective.find_groups(s[n])) for s in (own, torque))
         assert one <= two * (1 + 1e-9)
         better += one < two * 0.999
     assert better > 0
@@ -91,13 +91,13 @@ def test_other_heuristics_run_by_acceleration(arm, name):
     found = heuristics[name](SelectionTask(objective)).subsets
     assert [s.size for s in found] == list(range(1, arm.problem.candidates.size + 1))
     assert all(np.unique(s).size == s.size for s in found)
-    exact = next(s for s in found if objective.score(objective.find_units(s)) < 1e-6)
+    exact = next(s for s in found if objective.score(objective.find_groups(s)) < 1e-6)
     assert arm.acceleration_error(exact, objective.fit(exact).parameters) < 1e-6
 
 
 def test_the_exact_fit_survives_a_reduced_mass_matrix_that_is_singular(arm):
     objective = arm.objective()
-    light = objective.score((objective.find_units(np.array([arm.problem.candidates[0]]))[0],))
+    light = objective.score((objective.find_groups(np.array([arm.problem.candidates[0]]))[0],))
     assert light > 1
 
 

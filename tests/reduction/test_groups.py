@@ -32,7 +32,7 @@ def test_groups_stay_together(name, seed):
 @pytest.mark.parametrize("seed", range(6))
 def test_the_best_subset_of_groups_is_that_of_exhaustive_search(seed):
     p = grouped_problem(seed, rank=12)
-    best = all_best_errors(p.W, p.chi, [u.tolist() for u in p.units])
+    best = all_best_errors(p.W, p.chi, [u.tolist() for u in p.groups])
     proofs = found("best-subset", p).proofs
     assert set(proofs.status) == {"optimal"}
     for n, subset in zip(proofs.n, proofs.subsets, strict=True):
@@ -53,9 +53,9 @@ def test_each_forward_step_explains_most_per_parameter(seed):
             break
         before = squared(taken_order[:n])
         gains = [
-            (before - squared([*taken_order[:n], *unit])) / len(unit)
-            for unit in p.units
-            if unit[0] not in taken_order[:n]
+            (before - squared([*taken_order[:n], *group])) / len(group)
+            for group in p.groups
+            if group[0] not in taken_order[:n]
         ]
         taken = (before - squared(taken_order[:after])) / (after - n)
         assert taken >= max(gains) * (1 - 1e-9)
@@ -71,10 +71,10 @@ def test_each_backward_step_loses_least_per_parameter(seed):
         kept = taken_order[:after].tolist()
         now = error_by_definition(p.W, p.chi, kept) ** 2
         losses = []
-        for unit in p.units:
-            if unit[0] in kept:
-                rest = [k for k in kept if k not in unit]
-                losses.append((error_by_definition(p.W, p.chi, rest) ** 2 - now) / len(unit))
+        for group in p.groups:
+            if group[0] in kept:
+                rest = [k for k in kept if k not in group]
+                losses.append((error_by_definition(p.W, p.chi, rest) ** 2 - now) / len(group))
         lost = (error_by_definition(p.W, p.chi, taken_order[:n]) ** 2 - now) / (after - n)
         assert lost <= min(losses) * (1 + 1e-6) + 1e-14
 

@@ -88,7 +88,11 @@ def _say_quantity(quantity: str, bad: Sequence[Difference]) -> None:
 
 
 def _parse_tolerance(text: str) -> tuple[str, Tolerance]:
-    """Return the quantity and the tolerance that NAME=RELATIVE gives."""
+    """Return the quantity and the tolerance that NAME=RELATIVE gives.
+
+    Raises:
+        ConfigError: The text has another form, the quantity is unknown, or the number is negative.
+    """
     name, _, value = text.partition("=")
     try:
         relative, absolute = float(value), TOLERANCES[name].absolute

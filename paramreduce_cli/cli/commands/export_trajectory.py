@@ -111,7 +111,11 @@ def _find_first(
 
 
 def _find_chosen(trajectories: Trajectories, which: str) -> Trajectory:
-    """Return the trajectory that SET:NUMBER names."""
+    """Return the trajectory that SET:NUMBER names.
+
+    Raises:
+        ConfigError: There is no such trajectory; the message lists those that there are.
+    """
     name, _, number = which.partition(":")
     sets = {name: getattr(trajectories, name) for name in SETS}
     found = sets.get(name, ())

@@ -196,7 +196,11 @@ def _make_path(config: Path, file: Path) -> Path:
 
 
 def _make_template(name: str, kind: str, joints: int) -> str:
-    """Return a config to fill in, of the kind that is asked for."""
+    """Return a config to fill in, of the kind that is asked for.
+
+    Raises:
+        ConfigError: The name has characters that file names or YAML do not allow.
+    """
     if not re.fullmatch(NAME, name, re.ASCII):
         raise ConfigError(
             f"NAME: {name!r} is not a valid name. Begin with a letter or digit; letters, digits, _, - and dots may follow."
@@ -209,7 +213,11 @@ def _make_template(name: str, kind: str, joints: int) -> str:
 
 
 def _parse_lock(text: str) -> tuple[str, float]:
-    """Return joint and value from JOINT=VALUE."""
+    """Return joint and value from JOINT=VALUE.
+
+    Raises:
+        ConfigError: The text has another form, or the value is too large for a joint.
+    """
     joint, _, value = text.rpartition("=")
     try:
         number = parse_number(value)

@@ -105,7 +105,11 @@ def _list_finished(listed: Path, sweep: Sweep) -> dict[Path, dict[str, Any]]:
 
 
 def _load_summary(path: Path) -> dict[str, Any]:
-    """Return the summary in a results folder or in a file."""
+    """Return the summary in a results folder or in a file.
+
+    Raises:
+        ConfigError: There is no report, or the file is no summary.
+    """
     if path.is_dir() and not (path / SUMMARY).exists():
         raise make_no_results_error(path, "table")
     return load_summary(path)
@@ -148,7 +152,11 @@ def _format_cell(value: Any) -> str:
 
 
 def _write_parquet(path: Path, records: list[dict[str, Any]]) -> None:
-    """Write the rows of all runs as Parquet."""
+    """Write the rows of all runs as Parquet.
+
+    Raises:
+        ConfigError: pyarrow is not installed.
+    """
     try:
         import pyarrow
         import pyarrow.parquet

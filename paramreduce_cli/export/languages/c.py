@@ -225,7 +225,12 @@ class _Writer:
         return Language(calls, self.write_number, element)
 
     def write_batched(self, function: Function) -> dict[str, Any]:
-        """Return the body of a batched function in parts: what depends on parameters alone, angles, and the rest."""
+        """Return the body of a batched function as fields of the template.
+
+        Before the loop are lines that depend on parameters alone (``once``), and lines that compute the angles whose
+        sines and cosines are computed together (``before``, ``angles``); in the loop are the lines of each state
+        (``rest``).
+        """
         program = function.program
         language = self._make_language(batched=True)
         names = language.write_leaves(function)

@@ -161,7 +161,11 @@ class _Equations:
 def _close(
     equations: _Equations, mechanism: Mechanism, loops: Loops, moving: Iterable[int]
 ) -> FloatArray:
-    """Move some coordinates from the guess until the loops are closed."""
+    """Move some coordinates from the guess until the loops are closed.
+
+    Raises:
+        NumericalError: The loops stay open; the message says by how much, and which closure most.
+    """
     free = list(moving)
     start = loops.assembly
 
@@ -306,6 +310,10 @@ def _choose_equations(mechanism: Mechanism, loops: Loops, jacobians: list[FloatA
 
     Welds of planar or spherical linkages, and rods between two ball joints, have more equations than
     they take away freedom. They can be dropped if the same ones do wherever the loops are closed.
+
+    Raises:
+        NumericalError: The equations leave nothing that moves, or which of them are independent changes along the
+            motion.
     """
     jacobian, rows = _choose_generic(jacobians)
     if len(rows) == mechanism.n_q:
@@ -384,7 +392,11 @@ def _check_regular(mechanism: Mechanism, jacobian: FloatArray) -> None:
 
 
 def _check_hinges(mechanism: Mechanism, loops: Loops, q: FloatArray) -> None:
-    """Refuse closures whose axes are against each other, which their equations allow."""
+    """Refuse closures whose axes are against each other, which their equations allow.
+
+    Raises:
+        NumericalError: Two axes are against each other.
+    """
     poses = compute_body_poses(mechanism, q)
     for closure in loops.closures:
         A, B = (

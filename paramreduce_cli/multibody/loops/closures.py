@@ -53,7 +53,11 @@ class _ClosedPair:
         self._joints, self.closure, self.q = joints, closure, q
 
     def express_equations(self) -> list[ca.SX]:
-        """Return the expressions that are zero where the closure holds."""
+        """Return the expressions that are zero where the closure holds.
+
+        Raises:
+            ValueError: The kind of closure is unknown.
+        """
         if self.closure.kind not in CLOSURES:
             raise ValueError(f"there is no closure of the kind {self.closure.kind!r}")
         return CLOSURES[self.closure.kind].measure(self)

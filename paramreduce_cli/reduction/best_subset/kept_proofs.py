@@ -124,7 +124,11 @@ class KeptProofs:
         return joint
 
     def _join_jobs(self, count: int) -> list[Proofs]:
-        """Return the proofs of a number of jobs as one record in a list, which is empty if no job has ended."""
+        """Return the proofs of a number of jobs as one record in a list, which is empty if no job has ended.
+
+        Raises:
+            DataError: Some jobs have ended and others are missing, or they searched on different samples.
+        """
         found: dict[int, ProofItem] = {}
         for number in range(1, count + 1):
             key = _make_subtrees_key(number, count)

@@ -16,7 +16,7 @@ A node is three arrays:
 
 * ``sheet``, one free column a column: n rows of the Gram matrix, n of the inverse, the basis of
   the null space, then moments and solution;
-* ``numbers``: how many columns are FREE, the NULLITY, how many are INCLUDED, which unit was taken
+* ``numbers``: how many columns are FREE, the NULLITY, how many are INCLUDED, which group was taken
   (BRANCH) and the length of the log then (MARK), whether the included and free columns are
   nearly dependent (NEAR), and from FIRST on which columns are free;
 * ``errors``: INSIDE and BOUND.
@@ -69,12 +69,12 @@ class Data(NamedTuple):
     """One column of W a row, (n_columns, k)."""
     chi: FloatArray
     """(k,)"""
-    unit: IntArray
-    """Number of the unit that each column belongs to, (n_columns,)."""
+    group: IntArray
+    """Number of the group that each column belongs to, (n_columns,)."""
     first: IntArray
-    """First column of each unit, whose columns stand together, (n_units,)."""
+    """First column of each group, whose columns stand together, (n_groups,)."""
     size: IntArray
-    """Columns of each unit, (n_units,)."""
+    """Columns of each group, (n_groups,)."""
     places: int
     """Columns that may be included."""
     factor: float
@@ -97,7 +97,7 @@ class State(NamedTuple):
     included: IntArray
     """Columns of the current node, (n_columns,)."""
     log: IntArray
-    """Decisions on the way here: 0 before a branch, unit + 1 included, -unit - 1 excluded."""
+    """Decisions on the way here: 0 before a branch, group + 1 included, -group - 1 excluded."""
     progress: IntArray
     """LEVEL, whether to go back from it, length of the log, how many directions of the included
     columns are known (SPANNED), and how often a column was neither surely dependent nor surely
@@ -331,15 +331,15 @@ def _recompute(
 
 @_within
 def _decide(
-    tableau: FloatArray, counters: IntArray, errors: FloatArray, s: State, data: Data, unit: int,
+    tableau: FloatArray, counters: IntArray, errors: FloatArray, s: State, data: Data, group: int,
     include: bool,
 ) -> None:  # fmt: skip
-    """Include or exclude all columns of a unit."""
+    """Include or exclude all columns of a group."""
     progress = s.progress
-    s.log[progress[LOGGED]] = unit + 1 if include else -unit - 1
+    s.log[progress[LOGGED]] = group + 1 if include else -group - 1
     progress[LOGGED] += 1
-    first = data.first[unit]
-    for column in range(first, first + data.size[unit]):
+    first = data.first[group]
+    for column in range(first, first + data.size[group]):
         j = _find_position(counters, column)
         if include:
             s.included[counters[INCLUDED]] = column
@@ -351,11 +351,11 @@ def _decide(
 
 
 @inline
-def _branch(s: State, data: Data, unit: int) -> None:
-    """Keep the node for later, and continue with a copy that includes a unit."""
+def _branch(s: State, data: Data, group: int) -> None:
+    """Keep the node for later, and continue with a copy that includes a group."""
     level = s.progress[LEVEL]
     sheet, numbers = s.sheets[level], s.numbers[level]
-    numbers[BRANCH], numbers[MARK] = unit, s.progress[LOGGED]
+    numbers[BRANCH], numbers[MARK] = group, s.progress[LOGGED]
     s.log[s.progress[LOGGED]] = 0
     s.progress[LOGGED] += 1
     s.progress[LEVEL] = level + 1
@@ -372,7 +372,7 @@ def _branch(s: State, data: Data, unit: int) -> None:
         s.numbers[level + 1, k] = numbers[k]
     s.errors[level + 1, INSIDE] = s.errors[level, INSIDE]
     s.errors[level + 1, BOUND] = s.errors[level, BOUND]
-    _decide(deeper, s.numbers[level + 1], s.errors[level + 1], s, data, unit, _INCLUDE)
+    _decide(deeper, s.numbers[level + 1], s.errors[level + 1], s, data, group, _INCLUDE)
 
 
 @_making_arrays
@@ -390,21 +390,21 @@ def _is_parallel(s: State, data: Data, count: int, column: int, other: int) -> b
 
 @inline
 def _exclude_parallel(
-    tableau: FloatArray, counters: IntArray, errors: FloatArray, s: State, data: Data, unit: int
+    tableau: FloatArray, counters: IntArray, errors: FloatArray, s: State, data: Data, group: int
 ) -> None:
-    """Exclude the columns that are parallel, in what is left of them, to that of a unit.
+    """Exclude the columns that are parallel, in what is left of them, to that of a group.
 
-    A subset with one of them explains no more than the same with the unit, which is searched.
+    A subset with one of them explains no more than the same with the group, which is searched.
     """
-    own = _find_position(counters, data.first[unit])
+    own = _find_position(counters, data.first[group])
     for j in range(counters[FREE] - 1, -1, -1):
         column = counters[FIRST + j]
         near = tableau[j, j] * tableau[own, own] - tableau[j, own] ** 2 <= GONE * tableau[own, own]
-        if j == own or not near or data.size[data.unit[column]] > 1:
+        if j == own or not near or data.size[data.group[column]] > 1:
             continue
-        if _is_parallel(s, data, counters[INCLUDED], data.first[unit], column):
-            _decide(tableau, counters, errors, s, data, data.unit[column], _EXCLUDE)
-            own = _find_position(counters, data.first[unit])
+        if _is_parallel(s, data, counters[INCLUDED], data.first[group], column):
+            _decide(tableau, counters, errors, s, data, data.group[column], _EXCLUDE)
+            own = _find_position(counters, data.first[group])
 
 
 @inline
@@ -416,10 +416,10 @@ def _backtrack(s: State, data: Data) -> None:
         return
     sheet, numbers, errors = s.sheets[level], s.numbers[level], s.errors[level]
     s.progress[LOGGED] = numbers[MARK]
-    unit = numbers[BRANCH]
-    if data.size[unit] == 1:
-        _exclude_parallel(sheet, numbers, errors, s, data, unit)
-    _decide(sheet, numbers, errors, s, data, unit, _EXCLUDE)
+    group = numbers[BRANCH]
+    if data.size[group] == 1:
+        _exclude_parallel(sheet, numbers, errors, s, data, group)
+    _decide(sheet, numbers, errors, s, data, group, _EXCLUDE)
 
 
 @_within
@@ -435,7 +435,7 @@ def _offer(s: State, data: Data, count: int, first: int, second: int) -> None:
 
     It is calculated by orthogonalisation; -1 stands for no column.
     """
-    subset = np.full(data.unit.size, -1, np.int64)
+    subset = np.full(data.group.size, -1, np.int64)
     _copy_vector(s.included[:count], subset[:count])
     _span(s, data, count)
     basis = np.empty((count + 2, data.chi.size))
@@ -463,7 +463,7 @@ def _reduce_node(
 ) -> bool:
     """Decide what needs no branching at a node; False where it can be left.
 
-    Units that are explained already or have no place are excluded; those without which the
+    Groups that are explained already or have no place are excluded; those without which the
     bound would pass the threshold are included.
     """
     while True:
@@ -476,7 +476,7 @@ def _reduce_node(
             return False
         room = threshold - errors[BOUND]
         needed, must, useless = _count_mandatory(
-            tableau, counters, data.unit, data.size, places, room
+            tableau, counters, data.group, data.size, places, room
         )
         if useless >= 0:
             _decide(tableau, counters, errors, s, data, useless, _EXCLUDE)
@@ -501,21 +501,21 @@ def _is_mandatory(tableau: FloatArray, nullity: int, j: int, room: float) -> boo
 def _count_mandatory(
     tableau: FloatArray,
     counters: IntArray,
-    unit: IntArray,
+    group: IntArray,
     size: IntArray,
     columns_left: int,
     room: float,
 ) -> tuple[int, int, int]:
-    """Return the columns of mandatory units, one such unit, and an excludable unit; -1 for none."""
+    """Return the columns of mandatory groups, one such group, and an excludable group; -1 for none."""
     needed, must, nullity = 0, _NO_COLUMN, counters[NULLITY]
     for j in range(counters[FREE]):
-        own = unit[counters[FIRST + j]]
+        own = group[counters[FIRST + j]]
         if size[own] > columns_left or (size[own] == 1 and tableau[j, j] <= GONE):
             return needed, must, own
         if counters[NEAR] == 0 and _is_mandatory(tableau, nullity, j, room):
             counted = False
             for i in range(j if size[own] > 1 else 0):
-                same = unit[counters[FIRST + i]] == own
+                same = group[counters[FIRST + i]] == own
                 counted = counted or (same and _is_mandatory(tableau, nullity, i, room))
             if not counted:
                 needed += size[own]
@@ -541,7 +541,7 @@ def _fill_last_place(
 def _fill_last_two_places(
     tableau: FloatArray, counters: IntArray, inside: float, s: State, data: Data
 ) -> None:
-    """Try every pair of free columns, each of its own unit, in the last two places."""
+    """Try every pair of free columns, each of its own group, in the last two places."""
     moments, own = tableau[tableau.shape[0] - 2], s.spare
     limit = _compute_threshold(s.best[0], data.factor, data.uncertainty) + data.slack
     for i in range(counters[FREE]):
@@ -608,12 +608,12 @@ def _choose_branching_column(tableau: FloatArray, counters: IntArray) -> int:
 
 @inline
 def _repeat(s: State, data: Data, log: IntArray) -> None:
-    """Go the way that another search has logged."""
+    """Repeat the decisions that another search has logged."""
     for k in range(log.size):
         decision, level = log[k], s.progress[LEVEL]
         if decision == 0:
             _branch(s, data, log[k + 1] - 1)
-        elif decision < 0 or k == 0 or log[k - 1] != 0:  # a branch has included its unit already
+        elif decision < 0 or k == 0 or log[k - 1] != 0:  # a branch has included its group already
             _decide(
                 s.sheets[level], s.numbers[level], s.errors[level], s, data,
                 abs(decision) - 1, decision > 0,
@@ -622,7 +622,8 @@ def _repeat(s: State, data: Data, log: IntArray) -> None:
 
 @compile_loop(makes_arrays=False)
 def search(s: State, data: Data, log: IntArray, most: int) -> tuple[int, int]:
-    """Go the way that another search has logged, then on for at most so many nodes, and back from the last one.
+    """Repeat the decisions that another search has logged, go on for a limited number of nodes, and stop with the log
+    of where it is.
 
     It is one function, as whatever calls the others is compiled together with all of them.
 
@@ -630,7 +631,7 @@ def search(s: State, data: Data, log: IntArray, most: int) -> tuple[int, int]:
         DONE or PAUSED, and the number of nodes visited.
     """
     _repeat(s, data, log)
-    singles = data.size.size == data.unit.size
+    singles = data.size.size == data.group.size
     nodes = 0
     while True:
         if s.progress[GOING_BACK] == 1:
@@ -652,6 +653,6 @@ def search(s: State, data: Data, log: IntArray, most: int) -> tuple[int, int]:
             _fill_last_two_places(sheet, numbers, errors[INSIDE], s, data)
             open_ = False
         if open_:
-            _branch(s, data, data.unit[_choose_branching_column(sheet, numbers)])
+            _branch(s, data, data.group[_choose_branching_column(sheet, numbers)])
         else:
             s.progress[GOING_BACK] = 1

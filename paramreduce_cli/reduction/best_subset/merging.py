@@ -89,14 +89,14 @@ def merge_proofs(proofs: Sequence[Proofs]) -> Proofs:
     """Merge what several searches on the same data know of each size.
 
     Args:
-        proofs: Proofs of any sizes; those of other units than the last are left out.
+        proofs: Proofs of any sizes; those of other groups than the last are left out.
 
     Returns:
         For every size the entry that says most: what is proven, else the smaller error; with the
         largest bound of all.
     """
-    units = proofs[-1].units
-    usable = [one for one in proofs if _is_same(one.units, units)]
+    groups = proofs[-1].units
+    usable = [one for one in proofs if _is_same(one.units, groups)]
     sizes = sorted({n for one in usable for n in one.n.tolist()})
     return _stack_sizes(
         [_merge_size([one.get_size(n) for one in usable if n in one.n]) for n in sizes]

@@ -36,7 +36,7 @@ class PartedSearch:
         self._glances = 0
 
     def advance(self, nodes: int, threads: int) -> None:
-        """Go on for at most so many nodes on every thread; what one finds, all know afterwards."""
+        """Go on for a limited number of nodes on every thread; better subsets of one are known to all afterwards."""
         while len(self._open) < threads and (new := self._split()) is not None:
             self._open.append(new)
         at_once = self._open[:threads]
@@ -122,7 +122,7 @@ class PartedSearch:
 
     @property
     def bound(self) -> float:
-        """Squared error that no subset is below, as far as all parts have come."""
+        """Lower bound on the squared error of every subset, as far as all parts have come."""
         return min(part.bound for part in self._open or [self._best])
 
     @property

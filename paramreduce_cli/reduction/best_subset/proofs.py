@@ -17,13 +17,13 @@ from paramreduce_cli.reduction.best_subset.parts import PartedSearch
 from paramreduce_cli.reduction.best_subset.subset_search import (
     BEGINNING,
     RESOLUTION,
+    GroupedProblem,
     Search,
-    UnitProblem,
     compile_search,
     normalise_problem,
 )
 from paramreduce_cli.reduction.best_subset.ties import find_first_tie
-from paramreduce_cli.reduction.objective import Objective, Units
+from paramreduce_cli.reduction.objective import Objective, Subset
 from paramreduce_cli.reduction.problem import FULL_PRECISION
 from paramreduce_cli.reduction.task import SelectionTask
 
@@ -82,7 +82,7 @@ class ProofSearch:
     def __init__(self, task: SelectionTask, starts: Iterable[IntArray]) -> None:
         self._task = task
         self._objective: Objective = task.objective
-        self._problem: UnitProblem = normalise_problem(task.objective.problem)
+        self._problem: GroupedProblem = normalise_problem(task.objective.problem)
         self._place = {int(column): k for k, column in enumerate(self._problem.columns)}
         self._proofs: dict[int, _Proof] = {}
         self._spent: dict[int, int] = {}
@@ -97,10 +97,10 @@ class ProofSearch:
         return np.array([self._place[int(c)] for c in columns], dtype=np.int64)
 
     def _compute_squared_error(self, subset: IntArray) -> float:
-        return self._objective.score(self._find_units(subset)) ** 2
+        return self._objective.score(self._find_groups(subset)) ** 2
 
-    def _find_units(self, subset: IntArray) -> Units:
-        return self._objective.find_units(self._problem.columns[subset])
+    def _find_groups(self, subset: IntArray) -> Subset:
+        return self._objective.find_groups(self._problem.columns[subset])
 
     def _add_start(self, subset: IntArray) -> None:
         """Begin the proof of a size from a subset."""
@@ -108,9 +108,10 @@ class ProofSearch:
         self._proofs[subset.size] = _Proof(subset.size, subset, subset, error, (error, subset))
 
     def _remember(self, previous: Proofs) -> None:
-        """Take over what an earlier run has found and proven on the same units."""
-        same = len(previous.units) == len(self._objective.units) and all(
-            np.array_equal(a, b) for a, b in zip(previous.units, self._objective.units, strict=True)
+        """Take over what an earlier run has found and proven on the same groups."""
+        same = len(previous.units) == len(self._objective.groups) and all(
+            np.array_equal(a, b)
+            for a, b in zip(previous.units, self._objective.groups, strict=True)
         )
         for k, n in enumerate(previous.n.tolist() if same else []):
             proof = self._proofs.get(n)
@@ -289,7 +290,7 @@ class ProofSearch:
     @cached_property
     def _least_error(self) -> float:
         """Squared error of all columns together."""
-        return self._objective.score(tuple(range(len(self._objective.units)))) ** 2
+        return self._objective.score(tuple(range(len(self._objective.groups)))) ** 2
 
     @cached_property
     def _rank(self) -> int:
@@ -314,11 +315,11 @@ class ProofSearch:
             proof.squared_bound = proof.squared_error
 
     def _fill_up(self, subset: IntArray, n: int) -> IntArray:
-        """Return a subset with further units added, as long as columns are left."""
-        kept = self._find_units(subset)
-        for unit in range(len(self._objective.units)):
-            longer = (*kept, unit)
-            if unit not in kept and self._objective.count_columns(longer) <= n:
+        """Return a subset with further groups added, as long as columns are left."""
+        kept = self._find_groups(subset)
+        for group in range(len(self._objective.groups)):
+            longer = (*kept, group)
+            if group not in kept and self._objective.count_columns(longer) <= n:
                 kept = longer
         return self._number_columns(self._objective.list_columns(kept))
 
@@ -340,9 +341,9 @@ class ProofSearch:
             if not self._by_subtrees:
                 proof.squared_bound = bound = max(bound, proof.squared_bound)
 
-    def list_subsets(self) -> list[Units]:
+    def list_subsets(self) -> list[Subset]:
         """Return the best subset found of exactly each size, after :meth:`run`."""
-        return [self._find_units(proof.exact) for proof in self._proofs.values()]
+        return [self._find_groups(proof.exact) for proof in self._proofs.values()]
 
     def record(self) -> Proofs:
         """Return all proofs by size."""
@@ -361,7 +362,7 @@ class ProofSearch:
             return ProofStatus.BEYOND_RANK if done else proof.status
 
         return Proofs(
-            units=tuple(self._objective.units),
+            units=tuple(self._objective.groups),
             n=np.array([p.n for p in proofs]),
             subsets=tuple(self._problem.columns[p.subset] for p in proofs),
             torque_error=np.sqrt([p.squared_error for p in proofs]),

@@ -21,7 +21,7 @@ inverses of X'X, whose round-off grows with its square."""
 RESOLUTION = 1e-9
 """Relative difference of squared errors that a proof does not resolve."""
 _UPDATES = 1e-14
-"""Round-off of the square root of a bound, for every unit of the condition number."""
+"""Round-off of the square root of a bound, for every group of the condition number."""
 BEGINNING: IntArray = np.zeros(0, np.int64)
 """The log of a search that has not begun."""
 _SLACK = 1e-12
@@ -29,14 +29,14 @@ _SLACK = 1e-12
 
 
 @dataclass(frozen=True)
-class UnitProblem:
+class GroupedProblem:
     """A selection problem with columns and chi of unit length, its columns numbered from zero.
 
     Attributes:
         X: (k, n_columns)
         chi: (k,)
-        columns: Their numbers in the problem it was made from, units together.
-        unit: Number of the unit that each column belongs to, (n_columns,).
+        columns: Their numbers in the problem it was made from, groups together.
+        group: Number of the group that each column belongs to, (n_columns,).
         condition: Largest over smallest non-zero singular value of X.
         nearest: Smallest sine of the angle between two columns, those parallel to rounding aside.
         rank: Rank of X.
@@ -45,7 +45,7 @@ class UnitProblem:
     X: FloatArray
     chi: FloatArray
     columns: IntArray
-    unit: IntArray
+    group: IntArray
     condition: float
     nearest: float
     rank: int
@@ -66,15 +66,15 @@ class UnitProblem:
         return self.condition <= LARGEST_CONDITION and self.nearest >= 1 / LARGEST_CONDITION
 
 
-def normalise_problem(problem: SelectionProblem) -> UnitProblem:
+def normalise_problem(problem: SelectionProblem) -> GroupedProblem:
     """Scale the candidates' columns and chi to unit length; errors become shares of chi."""
-    units, columns = problem.units, problem.columns
+    groups, columns = problem.groups, problem.columns
     X = problem.X[:, columns]
     s = np.linalg.svd(X, compute_uv=False)
     rank = int(np.sum(s > DEPENDENT * s[0]))
-    unit = np.repeat(np.arange(len(units)), [u.size for u in units])
-    return UnitProblem(
-        X, problem.y, columns, unit, float(s[0] / s[rank - 1]), _find_smallest_sine(X), rank
+    group = np.repeat(np.arange(len(groups)), [u.size for u in groups])
+    return GroupedProblem(
+        X, problem.y, columns, group, float(s[0] / s[rank - 1]), _find_smallest_sine(X), rank
     )
 
 
@@ -89,7 +89,7 @@ def _find_smallest_sine(X: FloatArray) -> float:
 
 
 class Search:
-    """A branch-and-bound search for the best subset of at most so many columns.
+    """A branch-and-bound search for the best subset of at most ``size`` columns.
 
     Args:
         problem: The columns.
@@ -103,7 +103,7 @@ class Search:
 
     def __init__(
         self,
-        problem: UnitProblem,
+        problem: GroupedProblem,
         size: int,
         squared_error: float,
         subset: IntArray,
@@ -116,9 +116,9 @@ class Search:
         self._data = kernel.Data(
             columns=np.ascontiguousarray(problem.X.T),
             chi=problem.chi,
-            unit=problem.unit.astype(np.int64),
-            first=np.searchsorted(problem.unit, np.arange(problem.unit[-1] + 1)),
-            size=np.bincount(problem.unit).astype(np.int64),
+            group=problem.group.astype(np.int64),
+            first=np.searchsorted(problem.group, np.arange(problem.group[-1] + 1)),
+            size=np.bincount(problem.group).astype(np.int64),
             places=size,
             factor=factor * (1 - RESOLUTION),
             uncertainty=_UPDATES * problem.condition,
@@ -130,11 +130,11 @@ class Search:
         kernel.search(self._state, self._data, log.astype(np.int64), 0)
 
     def _make_root(
-        self, problem: UnitProblem, size: int, squared_error: float, subset: IntArray
+        self, problem: GroupedProblem, size: int, squared_error: float, subset: IntArray
     ) -> State:
         """Return the state at the root: all columns free."""
         kernel, X, chi = self._kernel, problem.X, problem.chi
-        n, levels = X.shape[1], min(size, int(problem.unit[-1]) + 1) + 2
+        n, levels = X.shape[1], min(size, int(problem.group[-1]) + 1) + 2
         inverse, null, solution, left = problem.fit
         sheets = np.zeros((levels, 2 * n + len(null) + 2, n))
         sheets[0] = np.vstack([X.T @ X, inverse, null, X.T @ chi, solution])
@@ -159,14 +159,14 @@ class Search:
         )
 
     def advance(self, nodes: int) -> None:
-        """Go on for at most so many nodes."""
+        """Go on for a limited number of nodes."""
         status, visited = self._kernel.search(self._state, self._data, BEGINNING, nodes)
         self.nodes += visited
         self.finished = status == self._kernel.DONE
 
     @property
     def depth(self) -> int | None:
-        """Decisions above the branch that waits nearest to the root, if one waits."""
+        """Number of decisions above the waiting branch nearest to the root; None if no branch waits."""
         marks = np.flatnonzero(self.log == 0)
         return int(marks[0]) if marks.size and not self.finished else None
 
@@ -214,7 +214,7 @@ class Search:
 
     @property
     def bound(self) -> float:
-        """Squared error that no subset is below, as far as the search has come, less round-off."""
+        """Lower bound on the squared error of every subset, as far as the search has come, less round-off."""
         bound = self._compute_bound()
         return float(max(0.0, np.sqrt(bound) - self._data.uncertainty) ** 2)
 
@@ -234,7 +234,7 @@ class Search:
         sheet, numbers = state.sheets[level], state.numbers[level]
         n, nullity = sheet.shape[1], int(numbers[kernel.NULLITY])
         free = numbers[kernel.FIRST : kernel.FIRST + numbers[kernel.FREE]]
-        own = np.flatnonzero(self._data.unit[free] == numbers[kernel.BRANCH])
+        own = np.flatnonzero(self._data.group[free] == numbers[kernel.BRANCH])
         if numbers[kernel.NEAR]:
             return float(state.errors[level, kernel.BOUND])
         apart = np.sum(sheet[2 * n : 2 * n + nullity, own] ** 2, axis=0) <= kernel.APART
@@ -251,5 +251,5 @@ class Search:
 def compile_search() -> None:
     """Compile the search, once for all runs, so that no time limit pays for it."""
     X = np.linalg.qr(np.arange(1.0, 17.0).reshape(4, 4) ** 1.5)[0]
-    problem = UnitProblem(X, X.sum(axis=1) / 2, np.arange(4), np.arange(4), 1.0, 1.0, 4)
+    problem = GroupedProblem(X, X.sum(axis=1) / 2, np.arange(4), np.arange(4), 1.0, 1.0, 4)
     Search(problem, 3, 1.0, np.zeros(0, np.int64), log=np.array([0, 1])).advance(100)

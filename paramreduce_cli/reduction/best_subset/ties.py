@@ -4,7 +4,7 @@ import numpy as np
 
 from paramreduce_cli.multibody.orthogonal import DEPENDENT
 from paramreduce_cli.records import BoolArray, FloatArray, IntArray
-from paramreduce_cli.reduction.best_subset.subset_search import RESOLUTION, UnitProblem
+from paramreduce_cli.reduction.best_subset.subset_search import RESOLUTION, GroupedProblem
 
 
 def find_ties(squared_errors: FloatArray, best: float) -> BoolArray:
@@ -12,7 +12,7 @@ def find_ties(squared_errors: FloatArray, best: float) -> BoolArray:
     return squared_errors <= best * (1 + RESOLUTION)
 
 
-def find_first_tie(problem: UnitProblem, subset: IntArray, squared_error: float) -> IntArray:
+def find_first_tie(problem: GroupedProblem, subset: IntArray, squared_error: float) -> IntArray:
     """Return the lexicographically first subset among ties that single swaps lead to.
 
     Subsets that span the same space are the bases of a matroid, whose first basis is reached from any other by swaps
@@ -27,7 +27,7 @@ def find_first_tie(problem: UnitProblem, subset: IntArray, squared_error: float)
         A subset as large, sorted.
     """
     found = np.sort(subset)
-    if problem.unit[-1] + 1 < problem.unit.size:
+    if problem.group[-1] + 1 < problem.group.size:
         return found
     place = 0
     while place < found.size:
@@ -42,7 +42,7 @@ def find_first_tie(problem: UnitProblem, subset: IntArray, squared_error: float)
     return found
 
 
-def _compute_errors_with(problem: UnitProblem, kept: IntArray, others: IntArray) -> FloatArray:
+def _compute_errors_with(problem: GroupedProblem, kept: IntArray, others: IntArray) -> FloatArray:
     """Return the squared errors of a subset with one further column each."""
     U, s, _ = np.linalg.svd(problem.X[:, kept], full_matrices=False)
     basis = U[:, s > DEPENDENT * s.max(initial=0.0)]

@@ -10,7 +10,7 @@ from paramreduce_cli.records import FloatArray, IntArray
 from paramreduce_cli.reduction.criteria.torque import TorqueObjective
 from paramreduce_cli.reduction.fitting import Fit, compute_relative_error, fit
 from paramreduce_cli.reduction.inputs import AccelerationData, CriterionInputs
-from paramreduce_cli.reduction.objective import Objective, Units, remove_unit
+from paramreduce_cli.reduction.objective import Objective, Subset, remove_group
 from paramreduce_cli.reduction.problem import SelectionProblem
 
 SEARCH_SAMPLES = 200
@@ -92,7 +92,9 @@ class _Accelerations:
         return slope.reshape(-1, columns.size)
 
     def fit(self, columns: IntArray, start: FloatArray) -> _Point | None:
-        """Minimise the exact error by Gauss-Newton steps that are halved until they help."""
+        """Minimise the exact error by Gauss-Newton steps that are halved until they help; return None if the start
+        cannot be evaluated.
+        """
         best = self.evaluate(columns, start)
         for _ in range(_STEPS if best is not None else 0):
             assert best is not None
@@ -146,11 +148,11 @@ class AccelerationObjective(Objective):
         """Torque error of the same subsets, which is cheap to compute."""
         return self._torque
 
-    def score(self, kept: Units) -> float:
+    def score(self, kept: Subset) -> float:
         """Return the acceleration error of the fit to the accelerations."""
         return self._fit_once(kept)[0]
 
-    def _fit_once(self, kept: Units) -> tuple[float, _Point | None]:
+    def _fit_once(self, kept: Subset) -> tuple[float, _Point | None]:
         """Return error and fitted point of a subset, kept for the next time; None if the fit is hopeless."""
         key = frozenset(kept)
         if key not in self._known:
@@ -163,10 +165,10 @@ class AccelerationObjective(Objective):
                 self._known[key] = (hopeless, None)
         return self._known[key]
 
-    def _sort_columns(self, kept: Units) -> IntArray:
+    def _sort_columns(self, kept: Subset) -> IntArray:
         return self.list_columns(tuple(sorted(kept)))
 
-    def _linearise(self, kept: Units) -> TorqueObjective:
+    def _linearise(self, kept: Subset) -> TorqueObjective:
         """Return the least-squares problem of the accelerations around a fitted subset."""
         point = self._fit_once(kept)[1]
         everything = np.arange(self.problem.W.shape[1])
@@ -179,32 +181,32 @@ class AccelerationObjective(Objective):
         factor: FloatArray = np.linalg.qr(np.column_stack([X, y]), mode="r")  # type: ignore[assignment]
         return TorqueObjective(self.problem.replace_data(factor))
 
-    def estimate_gains(self, kept: Units) -> FloatArray:
-        """Return the fall of the error per column for the most promising units; -inf for units that are not evaluated,
-        (n_units,).
+    def estimate_gains(self, kept: Subset) -> FloatArray:
+        """Return the fall of the error per column for the most promising groups; -inf for groups that are not evaluated,
+        (n_groups,).
         """
         promised = self._linearise(kept).estimate_gains(kept)
         result = np.full(promised.size, -np.inf)
         now = self.score(kept)
-        for unit in np.argsort(-promised, kind="stable")[:_PROPOSALS].tolist():
-            if promised[unit] > -np.inf:
-                result[unit] = (now - self.score((*kept, unit))) / self.widths[unit]
+        for group in np.argsort(-promised, kind="stable")[:_PROPOSALS].tolist():
+            if promised[group] > -np.inf:
+                result[group] = (now - self.score((*kept, group))) / self.widths[group]
         return result
 
-    def estimate_losses(self, kept: Units) -> FloatArray:
-        """Return the rise of the error per column for the units that promise to cost least; inf for units that are not
-        evaluated, (n_units,).
+    def estimate_losses(self, kept: Subset) -> FloatArray:
+        """Return the rise of the error per column for the groups that promise to cost least; inf for groups that are not
+        evaluated, (n_groups,).
         """
         promised = self._linearise(kept).estimate_losses(kept)
         result = np.full(promised.size, np.inf)
         now = self.score(kept)
-        for unit in np.argsort(promised, kind="stable")[:_PROPOSALS].tolist():
-            if promised[unit] < np.inf:
-                rise = self.score(remove_unit(kept, unit)) - now if len(kept) > 1 else 0.0
-                result[unit] = rise / self.widths[unit]
+        for group in np.argsort(promised, kind="stable")[:_PROPOSALS].tolist():
+            if promised[group] < np.inf:
+                rise = self.score(remove_group(kept, group)) - now if len(kept) > 1 else 0.0
+                result[group] = rise / self.widths[group]
         return result
 
-    def swap_best(self, kept: Units) -> Units:
+    def swap_best(self, kept: Subset) -> Subset:
         """Return the best subset among the most promising swaps and the subset itself."""
         proposals = self._linearise(kept).list_promising_swaps(kept, _PROPOSALS)
         return min([kept, *proposals], key=self.score)

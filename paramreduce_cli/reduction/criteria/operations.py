@@ -8,7 +8,7 @@ import numpy as np
 from paramreduce_cli.records import FloatArray, IntArray
 from paramreduce_cli.reduction.criteria.torque import TorqueObjective
 from paramreduce_cli.reduction.inputs import CriterionInputs
-from paramreduce_cli.reduction.objective import Objective, Units, remove_unit
+from paramreduce_cli.reduction.objective import Objective, Subset, remove_group
 from paramreduce_cli.reduction.problem import SelectionProblem
 
 _WEIGHT = 3.0
@@ -24,7 +24,7 @@ class OperationsObjective(Objective):
 
     Args:
         problem: The weighted least-squares problem that torques are fitted with.
-        cost: Returns the operations of a model of some columns.
+        cost: Function that returns the number of operations of a model, given its columns.
         limit: Torque error that is allowed, as a fraction.
     """
 
@@ -41,7 +41,7 @@ class OperationsObjective(Objective):
     @cached_property
     def largest(self) -> int:
         """A few more than greedy selection by torque needs to keep the limit."""
-        kept: Units = ()
+        kept: Subset = ()
         while self._torque.score(kept) > self._limit:
             longer = self._torque.add_best(kept, super().largest)
             if longer == kept:
@@ -54,8 +54,8 @@ class OperationsObjective(Objective):
         """Torque error of the same subsets, which is cheap to compute."""
         return self._torque
 
-    def count_operations(self, kept: Units) -> int:
-        """Return the operations of the model that keeps these units."""
+    def count_operations(self, kept: Subset) -> int:
+        """Return the number of operations of the model that keeps these groups of columns."""
         key = frozenset(kept)
         if not kept:
             return 0
@@ -63,8 +63,8 @@ class OperationsObjective(Objective):
             self._costs[key] = self._cost(np.sort(self.list_columns(kept)))
         return self._costs[key]
 
-    def score(self, kept: Units) -> float:
-        """Return the share of the operations, plus the penalty."""
+    def score(self, kept: Subset) -> float:
+        """Return the number of operations as a share of the full model's, plus the penalty."""
         return self.count_operations(kept) / self._all + self._compute_penalty(
             self._torque.score(kept)
         )
@@ -72,23 +72,23 @@ class OperationsObjective(Objective):
     def _compute_penalty(self, error: float) -> float:
         return _WEIGHT * max(0.0, float(np.log(max(error, 1e-300) / self._limit)))
 
-    def estimate_gains(self, kept: Units) -> FloatArray:
-        """Return the fall of the logarithmic error per operation of each unit, while the error is above the limit;
-        below the limit, minus the operations that the unit adds per column.
+    def estimate_gains(self, kept: Subset) -> FloatArray:
+        """Return the fall of the logarithmic error per operation of each group, while the error is above the limit;
+        below the limit, minus the operations that the group adds per column.
         """
         gains = self._torque.estimate_gains(kept)
         result = np.full(gains.size, -np.inf)
         now, error = self.count_operations(kept), self._torque.score(kept)
-        for unit in np.flatnonzero(gains > -np.inf).tolist():
-            more = 1 + max(0, self.count_operations((*kept, unit)) - now)
+        for group in np.flatnonzero(gains > -np.inf).tolist():
+            more = 1 + max(0, self.count_operations((*kept, group)) - now)
             if error > self._limit:
-                squared = max(error**2 - max(gains[unit], 0.0) * self.widths[unit], 1e-300)
-                result[unit] = (np.log(error) - np.log(squared) / 2) / more
+                squared = max(error**2 - max(gains[group], 0.0) * self.widths[group], 1e-300)
+                result[group] = (np.log(error) - np.log(squared) / 2) / more
             else:
-                result[unit] = -more / self.widths[unit]
+                result[group] = -more / self.widths[group]
         return result
 
-    def estimate_losses(self, kept: Units) -> FloatArray:
+    def estimate_losses(self, kept: Subset) -> FloatArray:
         """Return the rise of the squared error per operation that a removal saves.
 
         Removals that break the limit come after all others, in order of the error they leave.
@@ -96,16 +96,16 @@ class OperationsObjective(Objective):
         costs = self._torque.estimate_losses(kept)
         result = np.full(costs.size, np.inf)
         now, error = self.count_operations(kept), self._torque.score(kept)
-        for unit in kept:
-            if costs[unit] == np.inf:
+        for group in kept:
+            if costs[group] == np.inf:
                 continue
-            squared = error**2 + costs[unit] * self.widths[unit]
-            saved = 0.5 + max(0, now - self.count_operations(remove_unit(kept, unit)))
+            squared = error**2 + costs[group] * self.widths[group]
+            saved = 0.5 + max(0, now - self.count_operations(remove_group(kept, group)))
             over = squared > max(self._limit, error) ** 2
-            result[unit] = 1.0 + squared if over else (squared - error**2) / saved
+            result[group] = 1.0 + squared if over else (squared - error**2) / saved
         return result
 
-    def swap_best(self, kept: Units) -> Units:
+    def swap_best(self, kept: Subset) -> Subset:
         """Return the best subset among the swaps that promise the fewest operations, and the subset itself.
 
         Swaps may leave an error up to the limit, or up to 1.05 times the present error if that is larger. The
@@ -115,7 +115,7 @@ class OperationsObjective(Objective):
         exchanges = self._torque.list_swaps_within(kept, allowed)
         now = self.count_operations(kept)
         less = {
-            u: now - self.count_operations(remove_unit(kept, u))
+            u: now - self.count_operations(remove_group(kept, u))
             for u in {out for out, _, _ in exchanges}
         }
         more = {
@@ -127,7 +127,7 @@ class OperationsObjective(Objective):
             return (more[into] - less[out]) / self._all + self._compute_penalty(error)
 
         best = sorted(exchanges, key=estimate_score)[:_PROPOSALS]
-        proposals = [(*remove_unit(kept, out), into) for out, into, _ in best]
+        proposals = [(*remove_group(kept, out), into) for out, into, _ in best]
         return min([kept, *proposals], key=self.score)
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from paramreduce_cli.multibody.orthogonal import DEPENDENT, Orthogonaliser
 from paramreduce_cli.records import FloatArray, IntArray
 from paramreduce_cli.reduction.inputs import CriterionInputs
-from paramreduce_cli.reduction.objective import Objective, Units, remove_unit
+from paramreduce_cli.reduction.objective import Objective, Subset, remove_group
 from paramreduce_cli.reduction.problem import FULL_PRECISION, SelectionProblem, find_first_best
 
 
@@ -23,26 +23,26 @@ class TorqueObjective(Objective):
         super().__init__(problem)
         self._X = problem.X
         self._own = np.ascontiguousarray(problem.X[:, problem.columns])
-        self._taken: tuple[Units, Orthogonaliser] = ((), self._start_orthogonaliser())
+        self._taken: tuple[Subset, Orthogonaliser] = ((), self._start_orthogonaliser())
 
     def _start_orthogonaliser(self) -> Orthogonaliser:
         return Orthogonaliser(self._own, self.problem.y)
 
-    def score(self, kept: Units) -> float:
+    def score(self, kept: Subset) -> float:
         """Return the torque error of the least-squares fit."""
         X = self._X[:, self.list_columns(kept)]
         solution = np.linalg.lstsq(X, self.problem.y, rcond=DEPENDENT)[0]
         return float(np.linalg.norm(self.problem.y - X @ solution))
 
-    def estimate_gains(self, kept: Units) -> FloatArray:
-        """Return the fall of the squared error per column, (n_units,).
+    def estimate_gains(self, kept: Subset) -> FloatArray:
+        """Return the fall of the squared error per column, (n_groups,).
 
-        If only round-off is left of the torques, return the share of each unit that is independent of the subset.
+        If only round-off is left of the torques, return the share of each group that is independent of the subset.
         """
         rest = self._project_out(kept)
         squared = rest.compute_squared_lengths()
         if rest.y @ rest.y <= FULL_PRECISION**2:
-            shares = self.average_by_unit(squared)
+            shares = self.average_by_group(squared)
             return np.where(shares > 0, shares, -np.inf)
         dependent = squared == 0
         squared[dependent] = 1.0
@@ -51,32 +51,32 @@ class TorqueObjective(Objective):
         return gains if self.single else self._add_group_gains(rest, gains)
 
     def _add_group_gains(self, rest: Orthogonaliser, gains: FloatArray) -> FloatArray:
-        """Write the gains of units of several columns: what the columns explain together, per column."""
+        """Write the gains of groups of several columns: what the columns explain together, per column."""
         result = np.full(self.widths.size, -np.inf)
-        for unit, width in enumerate(self.widths.tolist()):
-            own = np.flatnonzero((self.owner == unit) & (gains > -np.inf))
+        for group, width in enumerate(self.widths.tolist()):
+            own = np.flatnonzero((self.owner == group) & (gains > -np.inf))
             if own.size and width == 1:
-                result[unit] = gains[own[0]]
+                result[group] = gains[own[0]]
             elif own.size:
                 X = rest.X[:, own]
                 explained = X @ np.linalg.lstsq(X, rest.y, rcond=DEPENDENT)[0]
-                result[unit] = explained @ explained / width
+                result[group] = explained @ explained / width
         return result
 
-    def estimate_losses(self, kept: Units) -> FloatArray:
-        """Return the rise of the squared error per column, (n_units,).
+    def estimate_losses(self, kept: Subset) -> FloatArray:
+        """Return the rise of the squared error per column, (n_groups,).
 
-        If removals are free, return the squared torques of the free units in the fit of least norm, whose unknowns are
+        If removals are free, return the squared torques of the free groups in the fit of least norm, whose unknowns are
         the torques that the parameters cause. Costs that are round-off are ties.
         """
         ordered = sorted(kept)
-        result = np.full(len(self.units), np.inf)
-        costs = _compute_removal_costs(self._X, self.problem.y, [self.units[u] for u in ordered])
+        result = np.full(len(self.groups), np.inf)
+        costs = _compute_removal_costs(self._X, self.problem.y, [self.groups[u] for u in ordered])
         costs[costs < FULL_PRECISION**2] = 0.0
         result[ordered] = costs
         return result
 
-    def swap_best(self, kept: Units) -> Units:
+    def swap_best(self, kept: Subset) -> Subset:
         """Return the subset after the best swap, by the closed form of its error; groups are tried one by one."""
         if not self.single:
             out, into, error = min(
@@ -84,42 +84,42 @@ class TorqueObjective(Objective):
                 key=lambda exchange: exchange[2],
                 default=(-1, -1, np.inf),
             )
-            return (*remove_unit(kept, out), into) if error < self.score(kept) else kept
+            return (*remove_group(kept, out), into) if error < self.score(kept) else kept
         improvement = self._compute_improvements(kept)
         if improvement is None or not np.any(improvement > 0):
             return kept
         best = find_first_best(improvement.ravel())
-        place, unit = divmod(best, len(self.units))
-        return (*remove_unit(kept, kept[place]), unit)
+        place, group = divmod(best, len(self.groups))
+        return (*remove_group(kept, kept[place]), group)
 
-    def list_promising_swaps(self, kept: Units, most: int) -> list[Units]:
+    def list_promising_swaps(self, kept: Subset, most: int) -> list[Subset]:
         """Return the subsets after the swaps that improve most, or worsen least."""
         improvement = self._compute_improvements(kept) if self.single else None
         if improvement is None:
             found = sorted(self._try_one_by_one(kept), key=lambda exchange: exchange[2])[:most]
-            return [(*remove_unit(kept, out), into) for out, into, _ in found]
+            return [(*remove_group(kept, out), into) for out, into, _ in found]
         order = np.argsort(-improvement, axis=None, kind="stable")[:most]
-        pairs = [divmod(int(k), len(self.units)) for k in order]
+        pairs = [divmod(int(k), len(self.groups)) for k in order]
         return [
-            (*remove_unit(kept, kept[place]), unit)
-            for place, unit in pairs
-            if improvement[place, unit] > -np.inf
+            (*remove_group(kept, kept[place]), group)
+            for place, group in pairs
+            if improvement[place, group] > -np.inf
         ]
 
-    def list_swaps_within(self, kept: Units, limit: float) -> list[tuple[int, int, float]]:
-        """Return the swaps that leave at most some error: the unit removed, the unit added, the error."""
+    def list_swaps_within(self, kept: Subset, limit: float) -> list[tuple[int, int, float]]:
+        """Return the swaps that leave at most some error: the group removed, the group added, the error."""
         improvement = self._compute_improvements(kept) if self.single else None
         if improvement is None:
             return [exchange for exchange in self._try_one_by_one(kept) if exchange[2] <= limit]
         errors = np.sqrt(np.maximum(self.score(kept) ** 2 - improvement, 0.0))
-        places, units = np.nonzero(errors <= limit)
+        places, groups = np.nonzero(errors <= limit)
         return [
-            (kept[place], int(unit), float(errors[place, unit]))
-            for place, unit in zip(places, units, strict=True)
+            (kept[place], int(group), float(errors[place, group]))
+            for place, group in zip(places, groups, strict=True)
         ]
 
-    def _compute_improvements(self, kept: Units) -> FloatArray | None:
-        """Return the fall of the squared error for every swap, (n_kept, n_units), or None if the subset is dependent.
+    def _compute_improvements(self, kept: Subset) -> FloatArray | None:
+        """Return the fall of the squared error for every swap, (n_kept, n_groups), or None if the subset is dependent.
 
         With r and e what the subset leaves of another column and of chi, b the subset's coefficients in either and P =
         (X'X)^-1: without column i these become r + b_i u and e + b_i u with |u|^2 = 1 / P_ii, orthogonal to r and e.
@@ -145,33 +145,33 @@ class TorqueObjective(Objective):
         result: FloatArray = np.where(possible, gains - b[:, -1:] ** 2 / P, -np.inf)
         return result
 
-    def _try_one_by_one(self, kept: Units) -> Iterator[tuple[int, int, float]]:
-        """Yield for every unit the best unit of its width in its place, and the error."""
-        for unit in kept:
-            rest = remove_unit(kept, unit)
+    def _try_one_by_one(self, kept: Subset) -> Iterator[tuple[int, int, float]]:
+        """Yield for every group the best group of its width in its place, and the error."""
+        for group in kept:
+            rest = remove_group(kept, group)
             gains = self.estimate_gains(rest)
-            gains[self.widths != self.widths[unit]] = -np.inf
-            gains[unit] = -np.inf
+            gains[self.widths != self.widths[group]] = -np.inf
+            gains[group] = -np.inf
             if np.any(gains > -np.inf):
                 into = find_first_best(gains)
-                yield unit, into, self.score((*rest, into))
+                yield group, into, self.score((*rest, into))
 
-    def _project_out(self, kept: Units) -> Orthogonaliser:
+    def _project_out(self, kept: Subset) -> Orthogonaliser:
         """Return what a subset leaves of all columns; quick if the subset extends the last one."""
         taken, rest = self._taken
         if kept[: len(taken)] != taken:
             taken, rest = (), self._start_orthogonaliser()
-        for unit in kept[len(taken) :]:
-            for column in [unit] if self.single else np.flatnonzero(self.owner == unit).tolist():
+        for group in kept[len(taken) :]:
+            for column in [group] if self.single else np.flatnonzero(self.owner == group).tolist():
                 rest.take(column)
         self._taken = (kept, rest)
         return rest
 
 
-def _compute_removal_costs(X: FloatArray, y: FloatArray, units: list[IntArray]) -> FloatArray:
-    """Return the cost of removing each unit per column, (n_units,); infinite where other removals are free."""
-    columns = np.concatenate(units)
-    sizes = np.array([unit.size for unit in units])
+def _compute_removal_costs(X: FloatArray, y: FloatArray, groups: list[IntArray]) -> FloatArray:
+    """Return the cost of removing each group per column, (n_groups,); infinite where other removals are free."""
+    columns = np.concatenate(groups)
+    sizes = np.array([group.size for group in groups])
     parts = np.split(np.arange(columns.size), np.cumsum(sizes)[:-1])
     U, s, Vt = np.linalg.svd(X[:, columns], full_matrices=True)
     rank = int(np.sum(s > DEPENDENT * s[0]))

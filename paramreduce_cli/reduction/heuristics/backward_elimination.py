@@ -1,6 +1,6 @@
 """Backward Elimination [Ros2019], Algorithm 1."""
 
-from paramreduce_cli.reduction.objective import Units, remove_unit
+from paramreduce_cli.reduction.objective import Subset, remove_group
 from paramreduce_cli.reduction.task import FoundSubsets, SelectionTask, make_nested
 
 
@@ -11,10 +11,10 @@ def backward_elimination(task: SelectionTask) -> FoundSubsets:
     what can be reached later, so it is not left to chance: of the free ones the parameter goes
     that causes the smallest torques in the fit of least norm. Ties remove the least preferred.
     """
-    left: Units = tuple(range(len(task.objective.units)))
-    order: Units = ()
+    left: Subset = tuple(range(len(task.objective.groups)))
+    order: Subset = ()
     while left:
         fewer = task.objective.remove_worst(left)
         (gone,) = set(left) - set(fewer)
-        left, order = remove_unit(left, gone), (gone, *order)
+        left, order = remove_group(left, gone), (gone, *order)
     return make_nested(task, order)

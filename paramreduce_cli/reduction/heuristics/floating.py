@@ -1,6 +1,6 @@
 """Sequential floating forward selection [Pudil1994]."""
 
-from paramreduce_cli.reduction.objective import Units
+from paramreduce_cli.reduction.objective import Subset
 from paramreduce_cli.reduction.problem import TIE
 from paramreduce_cli.reduction.task import FoundSubsets, SelectionTask, append_others, sort_by_size
 
@@ -12,8 +12,8 @@ def floating(task: SelectionTask) -> FoundSubsets:
     better than the best one of its size so far, and again, until it is not.
     """
     objective = task.objective
-    best: dict[int, tuple[float, Units]] = {}
-    kept: Units = ()
+    best: dict[int, tuple[float, Subset]] = {}
+    kept: Subset = ()
     while (longer := objective.add_best(kept, task.limit)) != kept:
         kept = longer
         _keep_if_better(task, best, kept)
@@ -27,10 +27,12 @@ def floating(task: SelectionTask) -> FoundSubsets:
     for k in range(len(kept) + 1, len(rest) + 1):
         if objective.count_columns(rest[:k]) <= task.limit:
             best[objective.count_columns(rest[:k])] = (0.0, rest[:k])
-    return sort_by_size(objective, [units for n, (_, units) in best.items() if n <= task.limit])
+    return sort_by_size(objective, [groups for n, (_, groups) in best.items() if n <= task.limit])
 
 
-def _keep_if_better(task: SelectionTask, best: dict[int, tuple[float, Units]], kept: Units) -> bool:
+def _keep_if_better(
+    task: SelectionTask, best: dict[int, tuple[float, Subset]], kept: Subset
+) -> bool:
     """Keep a subset if it is better than the best of its size so far, and return whether it is."""
     n, score = task.objective.count_columns(kept), task.objective.score(kept)
     if n in best and not score < best[n][0] * (1 - TIE):

@@ -1,6 +1,6 @@
 """Forward Selection with two iterations [Ros2019], Algorithm 3."""
 
-from paramreduce_cli.reduction.objective import remove_unit
+from paramreduce_cli.reduction.objective import remove_group
 from paramreduce_cli.reduction.task import FoundSubsets, SelectionTask, append_others, sort_by_size
 
 
@@ -14,7 +14,7 @@ def forward_selection_2(task: SelectionTask) -> FoundSubsets:
     kept = objective.add_best((), task.limit)
     subsets = [kept]
     while (longer := objective.add_best(kept, task.limit)) != kept:
-        renewed = objective.add_best(remove_unit(longer, kept[-1]), task.limit)
+        renewed = objective.add_best(remove_group(longer, kept[-1]), task.limit)
         # With groups the parameter that comes back may be wider or narrower.
         kept = (
             renewed if objective.count_columns(renewed) > objective.count_columns(kept) else longer

@@ -9,7 +9,7 @@ from paramreduce_cli.reduction.heuristics.backward_elimination import backward_e
 from paramreduce_cli.reduction.heuristics.forward_selection import forward_selection
 from paramreduce_cli.reduction.heuristics.forward_selection_2 import forward_selection_2
 from paramreduce_cli.reduction.heuristics.torque_only.qr import qr
-from paramreduce_cli.reduction.objective import Objective, Units
+from paramreduce_cli.reduction.objective import Objective, Subset
 from paramreduce_cli.reduction.problem import TIE
 from paramreduce_cli.reduction.task import Effort, FoundSubsets, SelectionTask, run, sort_by_size
 
@@ -46,7 +46,7 @@ class _SwapSearch:
     objective: Objective
     smallest: int
     limit: int
-    best: dict[int, Units] = field(default_factory=dict)
+    best: dict[int, Subset] = field(default_factory=dict)
     _scores: dict[int, float] = field(default_factory=dict)
     _seen: set[frozenset[int]] = field(default_factory=set)
 
@@ -54,9 +54,9 @@ class _SwapSearch:
         """Improve subsets of columns, and keep the best of each size."""
         for subset in subsets:
             if self.smallest <= len(subset) <= self.limit:
-                self.offer(self.objective.find_units(subset))
+                self.offer(self.objective.find_groups(subset))
 
-    def offer(self, kept: Units) -> bool:
+    def offer(self, kept: Subset) -> bool:
         """Improve a subset by swaps, and return whether it is better than the best of its size."""
         n = self.objective.count_columns(kept)
         known = self._scores.get(n, np.inf)
@@ -71,7 +71,7 @@ class _SwapSearch:
         return True
 
     def extend_to_neighbours(self) -> None:
-        """Add a unit to the best subsets or remove one, until no size gets better."""
+        """Add a group to the best subsets or remove one, until no size gets better."""
         while True:
             better = [self._offer_longer(n) for n in sorted(self.best)]
             better += [self._offer_shorter(n) for n in sorted(self.best, reverse=True)]
@@ -79,13 +79,13 @@ class _SwapSearch:
                 return
 
     def _offer_longer(self, n: int) -> bool:
-        """Offer the best subset of a size with one unit more."""
+        """Offer the best subset of a size with one group more."""
         longer = self.objective.add_best(self.best[n], self.limit)
         wide = self.objective.count_columns(longer)
         return n < wide <= self.limit and self.offer(longer)
 
     def _offer_shorter(self, n: int) -> bool:
-        """Offer the best subset of a size with one unit less."""
+        """Offer the best subset of a size with one group less."""
         kept = self.best[n]
         if len(kept) == 1:
             return False
@@ -96,7 +96,7 @@ class _SwapSearch:
         self, times: int, random: np.random.Generator, report_progress: ProgressCallback
     ) -> None:
         """Replace a few parameters by random ones, and improve the result."""
-        everything = np.arange(len(self.objective.units))
+        everything = np.arange(len(self.objective.groups))
         better = False
         for done, n in enumerate(sorted(self.best)):
             report_progress(Progress("random changes", done, len(self.best)))

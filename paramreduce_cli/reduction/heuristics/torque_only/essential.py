@@ -4,30 +4,30 @@ import numpy as np
 
 from paramreduce_cli.multibody.orthogonal import select_independent
 from paramreduce_cli.records import FloatArray
-from paramreduce_cli.reduction.objective import Objective, Units, remove_unit
+from paramreduce_cli.reduction.objective import Objective, Subset, remove_group
 from paramreduce_cli.reduction.task import FoundSubsets, SelectionTask, append_others, make_nested
 
 
 def essential(task: SelectionTask) -> FoundSubsets:
-    """Remove, one by one, the parameter that is known least surely.
+    """Remove, one by one, the parameter with the largest standard deviation relative to its value.
 
     Starts from the preferred base set; the parameter with the largest relative standard deviation
     goes, and the others are fitted again. A group is as sure as its surest member.
     """
     objective = task.objective
-    everything = tuple(range(len(objective.units)))
+    everything = tuple(range(len(objective.groups)))
     columns = select_independent(objective.problem.W, objective.list_columns(everything))
-    left: Units = tuple(sorted(objective.find_units(np.array(columns))))
+    left: Subset = tuple(sorted(objective.find_groups(np.array(columns))))
     tail = append_others(objective, left)[len(left) :]
     while left:
         unsure = _compute_relative_deviations(objective, left)
         gone = left[len(left) - 1 - int(np.argmax(unsure[::-1]))]  # ties: the least preferred
-        left, tail = remove_unit(left, gone), (gone, *tail)
+        left, tail = remove_group(left, gone), (gone, *tail)
     return make_nested(task, tail)
 
 
-def _compute_relative_deviations(objective: Objective, kept: Units) -> FloatArray:
-    """Return the standard deviation over the value of each unit, up to a common factor, (n_kept,)."""
+def _compute_relative_deviations(objective: Objective, kept: Subset) -> FloatArray:
+    """Return the standard deviation over the value of each group, up to a common factor, (n_kept,)."""
     problem = objective.problem
     columns = objective.list_columns(kept)
     X = problem.X[:, columns]
@@ -37,5 +37,5 @@ def _compute_relative_deviations(objective: Objective, kept: Units) -> FloatArra
     deviations = np.linalg.norm(vt.T / s, axis=1)
     with np.errstate(divide="ignore"):
         relative = np.where(values != 0, deviations / np.abs(values), np.inf)
-    ends = np.cumsum([objective.units[unit].size for unit in kept])[:-1]
+    ends = np.cumsum([objective.groups[group].size for group in kept])[:-1]
     return np.array([part.min() for part in np.split(relative, ends)])

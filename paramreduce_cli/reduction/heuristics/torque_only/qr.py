@@ -17,9 +17,9 @@ def qr(task: SelectionTask) -> FoundSubsets:
     rest = Orthogonaliser(problem.X[:, problem.columns])
     weights = problem.lengths[problem.columns] ** 2
     order: tuple[int, ...] = ()
-    while (left := objective.average_by_unit(rest.compute_squared_lengths() * weights)).any():
-        unit = find_first_best(left)
-        for column in np.flatnonzero(objective.owner == unit):
+    while (left := objective.average_by_group(rest.compute_squared_lengths() * weights)).any():
+        group = find_first_best(left)
+        for column in np.flatnonzero(objective.owner == group):
             rest.take(int(column))
-        order = (*order, unit)
+        order = (*order, group)
     return make_nested(task, append_others(objective, order))
