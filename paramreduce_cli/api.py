@@ -204,7 +204,7 @@ def make_report(
     Returns:
         Report with files by their path, and the summary as a mapping.
     """
-    wanted = config or Settings()
+    settings = config or Settings()
     robot = "" if model is None else model.mechanism.robot
     records = (
         samples,
@@ -212,9 +212,9 @@ def make_report(
         validation,
         model,
         *more,
-        make_provenance(wanted, robot, {}, {}, ""),
+        make_provenance(settings, robot, {}, {}, ""),
     )
-    return _run_stage(Report, wanted, *records)
+    return _run_stage(Report, settings, *records)
 
 
 def chosen(

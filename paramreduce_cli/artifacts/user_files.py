@@ -161,13 +161,13 @@ def _read_csv_arrays(path: Path, n_dof: int) -> dict[str, FloatArray]:
             raise DataError(
                 f"{path}, line 1: there is a column {key}{n_dof + 1}, but the robot has {n_dof} joints."
             )
-        wanted = [f"{key}{j + 1}" for j in range(n_dof)]
-        some = key == "tau" and any(name in columns for name in wanted)
-        if some or all(name in columns for name in wanted):
+        names = [f"{key}{j + 1}" for j in range(n_dof)]
+        some = key == "tau" and any(name in columns for name in names)
+        if some or all(name in columns for name in names):
             unknown = np.full(len(data), np.nan)
-            arrays[key] = np.column_stack([columns.get(name, unknown) for name in wanted])
+            arrays[key] = np.column_stack([columns.get(name, unknown) for name in names])
         elif key != "tau":
-            missing = [name for name in wanted if name not in columns]
+            missing = [name for name in names if name not in columns]
             raise DataError(
                 f"{path}, line 1: the header lacks {', '.join(missing)}. Columns are t, z1 ... "
                 f"z{n_dof}, dz1 ..., ddz1 ..., and optionally tau1 ...; the file has {', '.join(header)}."

@@ -18,8 +18,8 @@ def load_current(config: Config | None, store: Store, record: type) -> Any:
     robot = config.robot if config is not None else None
     found = load_file(store.get_path(record), record, robot, find_maker(record).name)[0]
     if mismatch := Runner(config, store, jobs=1).describe_mismatch(record):
-        again, command = ("Make it again.", "") if config is None else ("", "run")
+        remedy, command = ("Make it again.", "") if config is None else ("", "run")
         raise ArtifactError(
-            f"{mismatch}.", rejected=str(store.get_path(record)), remedy=again, command=command
+            f"{mismatch}.", rejected=str(store.get_path(record)), remedy=remedy, command=command
         )
     return found

@@ -92,13 +92,13 @@ def _describe_selected(results: Path) -> str:
         selected, measured = summary["selected"], summary["identification"]
         if measured is None:
             errors = {part: selected["torque_error"][part] for part in ("estimation", "validation")}
-            told = ", ".join(
+            error_text = ", ".join(
                 f"{format_percent(e)} ({part})" for part, e in errors.items() if e is not None
             )
             if test := selected["torque_error"].get("test"):
-                told += f", {format_percent_range(**test)} (test)"
+                error_text += f", {format_percent_range(**test)} (test)"
         else:
-            told = f"{format_percent(measured['reduced']['held_out'])} of the measured torques, held out"
+            error_text = f"{format_percent(measured['reduced']['held_out'])} of the measured torques, held out"
     except (ArtifactError, KeyError, TypeError) as problem:
         return f"its report cannot be read ({problem})"
-    return f"{selected['heuristic']} with {selected['n']} parameters, torque error {told}"
+    return f"{selected['heuristic']} with {selected['n']} parameters, torque error {error_text}"

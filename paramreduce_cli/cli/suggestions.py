@@ -49,11 +49,11 @@ class UnknownCommandError(click.UsageError):
 
     def __init__(self, name: str, commands: Sequence[str], context: click.Context) -> None:
         self.name = name
-        wanted = name.lower().replace("_", "-")
-        near = difflib.get_close_matches(wanted, commands, n=1, cutoff=_LIKE_COMMAND)
+        typed = name.lower().replace("_", "-")
+        near = difflib.get_close_matches(typed, commands, n=1, cutoff=_LIKE_COMMAND)
         hint = "`paramreduce --help` lists them."
-        if wanted in ("version", "help"):
-            hint = f"see `paramreduce --{wanted}`."
+        if typed in ("version", "help"):
+            hint = f"see `paramreduce --{typed}`."
         elif near:
             hint = f"Did you mean `paramreduce {near[0]}`?"
         super().__init__(f"there is no command {name!r}; {hint}", context)
@@ -221,8 +221,8 @@ def find_nearest_choice(rejected: str, choices: Sequence[str]) -> str:
     if digits and not name.strip(digits):
         numbered = [choice.partition(":")[0] for choice in others if ":" in choice]
         name, number = default.partition(":")[0] or (numbered or others)[0], digits
-    begun = [choice for choice in others if choice.partition(":")[0].startswith(name)]
-    near = begun or difflib.get_close_matches(name, others or choices, n=1, cutoff=0.0)
+    completions = [choice for choice in others if choice.partition(":")[0].startswith(name)]
+    near = completions or difflib.get_close_matches(name, others or choices, n=1, cutoff=0.0)
     return _limit_to_range(near[0], number or default.partition(":")[2])
 
 
@@ -234,8 +234,8 @@ def _limit_to_range(choice: str, number: str) -> str:
     if not all(one.isdecimal() for one in listed):
         return choice
     known = range(int(first), int(last) + 1) if dots else [int(one) for one in listed]
-    wanted = int(number) if number.isdecimal() else known[0]
-    return f"{name}:{min(known, key=lambda one: abs(one - wanted))}"
+    size = int(number) if number.isdecimal() else known[0]
+    return f"{name}:{min(known, key=lambda one: abs(one - size))}"
 
 
 def _replace_word(words: Sequence[str], old: str, new: str) -> list[str] | None:
@@ -250,15 +250,15 @@ def _replace_word(words: Sequence[str], old: str, new: str) -> list[str] | None:
 
 def _find_option(name: str, command: click.Command, words: Sequence[str]) -> str | None:
     """Return the option that takes the value, is spelt alike, or begins with the one letter that was typed, or None."""
-    taken = [parameter for parameter in command.params if isinstance(parameter, click.Option)]
+    parameters = [parameter for parameter in command.params if isinstance(parameter, click.Option)]
     value = " ".join(words).partition(f" {name}")[2].lstrip(" =").split(" ")[0]
-    for parameter in taken:
+    for parameter in parameters:
         if isinstance(parameter.type, click.Choice) and value in parameter.type.choices:
             return max(parameter.opts, key=len)
-    options = [option for parameter in taken for option in parameter.opts]
+    options = [option for parameter in parameters for option in parameter.opts]
     if not name.startswith("--"):
-        begun = [option for option in options if option.startswith(f"-{name}")]
-        return begun[0] if len(begun) == 1 else None
+        completions = [option for option in options if option.startswith(f"-{name}")]
+        return completions[0] if len(completions) == 1 else None
     near = difflib.get_close_matches(name, options, n=1, cutoff=_LIKE_OPTION)
     return near[0] if near else None
 

@@ -302,16 +302,16 @@ class _PacedLines:
     def show(self, p: Progress) -> None:
         """Write a line, if the last one is long ago."""
         now = time.monotonic()
-        begun = self._begun.setdefault(p.task, now)
+        start = self._begun.setdefault(p.task, now)
         if now - self._told >= self._PAUSE and p.done < p.total:
             self._told = now
-            self._tell(p, _estimate_seconds_left(p, now - begun))
+            self._tell(p, _estimate_seconds_left(p, now - start))
 
 
 def _estimate_seconds_left(p: Progress, passed: float) -> float | None:
     """Return the seconds that a task still takes, None where that cannot be told."""
-    share = p.done / p.total if p.total else 1.0
-    return passed * (1 - share) / share if 0 < share < 1 else None
+    fraction = p.done / p.total if p.total else 1.0
+    return passed * (1 - fraction) / fraction if 0 < fraction < 1 else None
 
 
 _FIRST_PAUSE = 2.0
@@ -334,26 +334,28 @@ class _Lines:
     def show(self, p: Progress) -> None:
         """Print a step of progress if enough time has passed."""
         now = time.monotonic()
-        begun = self._begun.setdefault(p.task, now)
+        start = self._begun.setdefault(p.task, now)
         told_before = p.task in self._told
         pause = self._pause if told_before else min(self._pause, _FIRST_PAUSE)
         # A task of one step has no other moment to be told of before its end.
         single = p.done == 0 and p.total == 1
-        if p.done < p.total and not single and now - self._told.get(p.task, begun) < pause:
+        if p.done < p.total and not single and now - self._told.get(p.task, start) < pause:
             return
         if p.done >= p.total:
-            told = self._told.pop(p.task, None) is not None
+            was_shown = self._told.pop(p.task, None) is not None
             del self._begun[p.task]
-            if not (told or p.detail) and now - begun < self._pause:
+            if not (was_shown or p.detail) and now - start < self._pause:
                 return
         else:
             self._told[p.task] = now
-        self._tell(p, _estimate_seconds_left(p, now - begun))
+        self._tell(p, _estimate_seconds_left(p, now - start))
 
 
 def _format_line(p: Progress, left: float | None) -> str:
     """Return a step of progress as text."""
-    share = f"{100 * p.done / p.total:.0f} %" if p.total == 1 else f"{p.done:.4g} of {p.total:.4g}"
-    state = "done" if p.done >= p.total else share if p.done else "begun"
+    fraction = (
+        f"{100 * p.done / p.total:.0f} %" if p.total == 1 else f"{p.done:.4g} of {p.total:.4g}"
+    )
+    state = "done" if p.done >= p.total else fraction if p.done else "begun"
     rest = f", about {left:.0f} s left" if left is not None and left >= 1 else ""
     return f"{p.task}: {state}{rest}{', ' + p.detail if p.detail else ''}"

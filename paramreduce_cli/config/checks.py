@@ -167,22 +167,22 @@ def _check_symmetries(config: Config) -> Iterator[Problem]:
 
 def _check_simulation(config: Config) -> Iterator[Problem]:
     """Yield problems of the simulation."""
-    wanted = config.sampling.simulation
-    if wanted is None:
+    section = config.sampling.simulation
+    if section is None:
         return
     path: Key = ("sampling", "simulation")
     names = config.description.bodies.list_independent_coordinates()
-    for key, given in (("inputs", wanted.inputs), ("start", wanted.start)):
+    for key, given in (("inputs", section.inputs), ("start", section.start)):
         for name in given:
             if name not in names:
                 yield (*path, key, name), UnknownNameError("independent coordinate", name, names)
-    for name, (lower, upper) in wanted.start.items():
+    for name, (lower, upper) in section.start.items():
         if lower > upper:
             yield (*path, "start", name), f"the range crosses: {lower:g} is above {upper:g}"
-    if wanted.step * _FEWEST_STEPS > wanted.duration:
-        yield (*path, "step"), f"{wanted.step:g} s is too long for {wanted.duration:g} s"
-    if wanted.duration / wanted.step > _MOST_STEPS:
-        yield (*path, "step"), f"makes more than {_MOST_STEPS} samples of {wanted.duration:g} s"
+    if section.step * _FEWEST_STEPS > section.duration:
+        yield (*path, "step"), f"{section.step:g} s is too long for {section.duration:g} s"
+    if section.duration / section.step > _MOST_STEPS:
+        yield (*path, "step"), f"makes more than {_MOST_STEPS} samples of {section.duration:g} s"
     for name, drive in config.list_drives().items():
         if Kind.COULOMB in drive.get_values() and not drive.smoothing:
             yield ("drives",), f"{name} needs a smoothing: a sign that jumps cannot be simulated"
@@ -332,11 +332,11 @@ def _check_selection(config: Config) -> Iterator[Problem]:
     ):
         if n is not None and n > total:
             yield path, f"is {n}, but {config.robot} has {total} parameters"
-    most, wanted = config.reduction.stop.parameters, config.selected.n
-    if most is not None and wanted is not None and wanted > most:
+    most, size = config.reduction.stop.parameters, config.selected.n
+    if most is not None and size is not None and size > most:
         yield (
             ("selected", "n"),
-            f"is {wanted}, but reduction.stop.parameters stops at {most}; raise that, or lower this",
+            f"is {size}, but reduction.stop.parameters stops at {most}; raise that, or lower this",
         )
 
 

@@ -137,8 +137,8 @@ def _count_joints_between(mechanism: Mechanism, a: int, b: int) -> int:
 
 def _list_path_to_base(mechanism: Mechanism, body: int) -> list[int]:
     """Return the bodies from a body to the base, the body first."""
-    way = []
+    path = []
     while body != BASE:
-        way.append(body)
+        path.append(body)
         body = mechanism.bodies[body].parent
-    return way
+    return path

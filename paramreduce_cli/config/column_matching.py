@@ -166,9 +166,9 @@ def match_joint_names(
         ConfigError: Several columns fit one joint equally well.
     """
     exact = {joint: _keep_likeliest(_match_exactly(names, words, joint), words) for joint in joints}
-    taken = {name for found in exact.values() for name in found}
+    used = {name for found in exact.values() for name in found}
     partial = {
-        joint: exact[joint] or _keep_likeliest(_match_partly(names, words, joint, taken), words)
+        joint: exact[joint] or _keep_likeliest(_match_partly(names, words, joint, used), words)
         for joint in joints
     }
     if not all(partial.values()):

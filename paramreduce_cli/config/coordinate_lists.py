@@ -35,21 +35,21 @@ def cut_to_independent(config: Config) -> Config:
     if not bodies.closed:
         return config
     names = bodies.list_coordinates()
-    places = [names.index(name) for name in bodies.list_independent_coordinates() if name in names]
+    indices = [names.index(name) for name in bodies.list_independent_coordinates() if name in names]
     cut: list[str] = []
     for key in PER_JOINT:
         values = read_per_joint(config, key)
-        if not isinstance(values, list) or len(values) != len(names) or len(values) == len(places):
+        if not isinstance(values, list) or len(values) != len(names) or len(values) == len(indices):
             continue
         cut.append(".".join(key))
-        own: Any = [values[k] for k in places]
+        own: Any = [values[k] for k in indices]
         for depth in range(len(key) - 1, 0, -1):
             own = read_per_joint(config, key[:depth]).model_copy(update={key[depth]: own})
         config = config.model_copy(update={key[0]: own})
     if cut:
         warnings.warn(
             f"{', '.join(cut)}: given for all {len(names)} coordinates; those of the independent ones are "
-            f"taken: {', '.join(names[k] for k in places)}",
+            f"taken: {', '.join(names[k] for k in indices)}",
             ParamreduceWarning,
             stacklevel=2,
         )

@@ -69,9 +69,9 @@ def copy_example(name: str, path: Path) -> tuple[list[Path], list[str]]:
     beside = [entry for entry in dict.fromkeys(named) if (source.parent / entry).is_file()]
     inside = [entry for entry in beside if ".." not in Path(entry).parts]
     pairs = [(source, path), *((source.parent / e, path.parent / e) for e in inside)]
-    taken = [new for old, new in pairs if new.exists() and new.read_bytes() != old.read_bytes()]
-    if taken:
-        raise make_exists_error(taken[0], None if taken[0] == path else path)
+    existing = [new for old, new in pairs if new.exists() and new.read_bytes() != old.read_bytes()]
+    if existing:
+        raise make_exists_error(existing[0], None if existing[0] == path else path)
     try:
         for original, target in pairs:
             target.parent.mkdir(parents=True, exist_ok=True)

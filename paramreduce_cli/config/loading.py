@@ -224,9 +224,9 @@ def _correct_setting(document: Document, problems: list[Problem]) -> tuple[str, 
     names = key.split(".")
     if error.is_key:
         names[len(path) - 1 : len(path)] = [error.nearest] if error.nearest else []
-        places = find_keys(error.name) if len(path) == 1 and not error.nearest else []
-        if error.nearest or len(places) == 1:
-            return text, [f"{'.'.join(names) or places[0]}={value}"]
+        positions = find_keys(error.name) if len(path) == 1 and not error.nearest else []
+        if error.nearest or len(positions) == 1:
+            return text, [f"{'.'.join(names) or positions[0]}={value}"]
     elif error.nearest:
         depth = len(names)
         return text, [f"{key}={_replace_item(value, path[depth:], error.nearest)}"]

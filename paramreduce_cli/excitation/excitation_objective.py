@@ -43,7 +43,7 @@ class Bound:
     """The bound that a motion is nearest to, or misses by most."""
 
     excess: float
-    """Above zero outside; without unit."""
+    """Distance of the worst value beyond the bound, as a fraction of the bound's size; negative inside."""
     name: str
 
 

@@ -92,12 +92,12 @@ def shrink_to_feasible(free: FloatArray, still: FloatArray, objective: FreeObjec
     Raises:
         NumericalError: Even the smallest motion does not keep them.
     """
-    share = 1.0
-    while share > _SMALLEST_SHARE:
-        drawn = still + share * (free - still)
+    fraction = 1.0
+    while fraction > _SMALLEST_SHARE:
+        drawn = still + fraction * (free - still)
         if np.isfinite(objective(drawn.ravel())[0]):
             return drawn
-        share *= _SHRINKS
+        fraction *= _SHRINKS
     nearest = objective.find_worst_bound(drawn.ravel())
     if nearest.excess < 0:
         raise NumericalError(

@@ -68,10 +68,10 @@ class LimitMap:
 
     def scale_to_limits(self, free: FloatArray) -> FloatArray:
         """Return the series scaled so that its motion reaches a limit exactly, or stays inside for the ball mapping."""
-        share = self.compute_ratios(free)
+        fraction = self.compute_ratios(free)
         if self._mapping == "ball":
-            share = np.maximum(share, 1.0)
-        harmonics = free[:, 1:] @ self._projection / share[:, None]
+            fraction = np.maximum(fraction, 1.0)
+        harmonics = free[:, 1:] @ self._projection / fraction[:, None]
         up, down, _ = self._compute_extremes(harmonics)
         return self._insert_offset(free[:, 0], harmonics, up, down)
 
@@ -124,9 +124,9 @@ class LimitMap:
 
     def compute_resting_offset(self, z: FloatArray) -> FloatArray:
         """Return the free offsets of joints that rest at ``z``, both (n_dof,)."""
-        share = (z - self._middle) / (self._reach * self.margin)
-        share = np.clip(share, -_FURTHEST, _FURTHEST)
-        return share / np.sqrt(1 - share**2)
+        fraction = (z - self._middle) / (self._reach * self.margin)
+        fraction = np.clip(fraction, -_FURTHEST, _FURTHEST)
+        return fraction / np.sqrt(1 - fraction**2)
 
     def _compute_extremes(self, harmonics: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return the shares of half the position range up and down, and of the rates, (n_dof,) each."""
@@ -140,8 +140,8 @@ class LimitMap:
     ) -> FloatArray:
         """Place the offset so that the motion stays in its range, whatever the free offset is."""
         centre, room = (down - up) / 2, 1 - (up + down) / 2
-        share = centre + room * _squash(offset)
-        return np.column_stack([self._middle + self._reach * self.margin * share, harmonics])
+        fraction = centre + room * _squash(offset)
+        return np.column_stack([self._middle + self._reach * self.margin * fraction, harmonics])
 
 
 def _divide_by_limits(motion: FloatArray, limits: FloatArray) -> FloatArray:

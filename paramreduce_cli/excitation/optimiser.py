@@ -42,7 +42,7 @@ class Step:
     """A step of a search: one level, and which candidates take it."""
 
     level: Level
-    share: float
+    fraction: float
     """Fraction of the starts beyond the polished ones: 1 for all starts, 0 for the polished ones alone."""
     rule: Mapping[str, float]
     """When IPOPT stops."""
@@ -166,7 +166,7 @@ def optimise_trajectory(
     started = time.process_time()
     search = _Search(excitation, settings)
     steps = search.plan.steps
-    counts = [settings.count_candidates(step.share) for step in steps]
+    counts = [settings.count_candidates(step.fraction) for step in steps]
     candidates = search.draw_starts(seed)
     iterations = 0
     for step, count in zip(steps, counts, strict=True):
@@ -397,7 +397,7 @@ def describe(
         peak_position=np.abs(z - limits.middle).max(axis=0),
         peak_velocity=np.abs(dz).max(axis=0),
         peak_torque=excitation.compute_peak_torques(q[::FINER], dz, ddz),
-        reach=np.max([share.max(axis=0) for share in shares], axis=0),
+        reach=np.max([fraction.max(axis=0) for fraction in shares], axis=0),
         extremes=np.column_stack([quantities.min(axis=0), quantities.max(axis=0)]),
         cpu_seconds=cpu_seconds,
         iterations=iterations,

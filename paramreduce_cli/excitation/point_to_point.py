@@ -34,10 +34,10 @@ def evaluate_point_to_point(
         z, dz and ddz, each (n_points, n_dof).
     """
     x = (time / motion.duration)[:, None]
-    way = motion.end - motion.start
-    z = motion.start + way * x**3 * (10 + x * (6 * x - 15))
-    dz = way / motion.duration * 30 * (x * (1 - x)) ** 2
-    ddz = way / motion.duration**2 * 60 * x * (1 - x) * (1 - 2 * x)
+    displacement = motion.end - motion.start
+    z = motion.start + displacement * x**3 * (10 + x * (6 * x - 15))
+    dz = displacement / motion.duration * 30 * (x * (1 - x)) ** 2
+    ddz = displacement / motion.duration**2 * 60 * x * (1 - x) * (1 - 2 * x)
     return z, dz, ddz
 
 
@@ -60,10 +60,10 @@ def evaluate_along(motions: Sequence[PointToPoint], points: int, finer: int) -> 
         times = sample_point_to_point_times(motion, points)[span.start : span.stop]
         step = motion.duration / (points - 1) / finer
         between = times[0] + step * np.arange(finer * times.size)
-        way = evaluate_point_to_point(motion, np.minimum(between, motion.duration))[0]
+        positions = evaluate_point_to_point(motion, np.minimum(between, motion.duration))[0]
         states = evaluate_point_to_point(motion, times)
         return StateBlock(
-            span.trajectory, times, *states, fine_positions=way if finer > 1 else None
+            span.trajectory, times, *states, fine_positions=positions if finer > 1 else None
         )
 
     return at
@@ -135,11 +135,11 @@ class _MotionLimits:
 
     def find_fastest(self, start: FloatArray, end: FloatArray) -> PointToPoint | None:
         """Return the fastest motion between two positions; None where there is none."""
-        way = np.abs(end - start)
+        distance = np.abs(end - start)
         duration = max(
-            float(np.max(_PEAK_SPEED * way / self._limits.velocity)),
-            float(np.sqrt(np.max(_PEAK_ACCELERATION * way / self._limits.acceleration))),
-            float(np.max(self._least[way > 0], initial=0.0)),
+            float(np.max(_PEAK_SPEED * distance / self._limits.velocity)),
+            float(np.sqrt(np.max(_PEAK_ACCELERATION * distance / self._limits.acceleration))),
+            float(np.max(self._least[distance > 0], initial=0.0)),
         )
         motion = PointToPoint(start, end, duration)
         if duration == 0 or not self._is_free(motion):

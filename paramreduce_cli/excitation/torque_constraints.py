@@ -35,9 +35,9 @@ class TorqueConstraints:
 
     def compute_rows(self, scaled: FloatArray, dz: FloatArray) -> FloatArray:
         """Return squared shares of the limits minus one, (n_points, 2 n_dof)."""
-        share = scaled * self._per_torque
+        ratios = scaled * self._per_torque
         power = scaled * dz * self._per_power
-        return np.column_stack([share, power]) ** 2 - 1
+        return np.column_stack([ratios, power]) ** 2 - 1
 
     def compute_vector_jacobian_product(
         self, scaled: FloatArray, dz: FloatArray, bar: FloatArray

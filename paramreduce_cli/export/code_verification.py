@@ -121,10 +121,10 @@ def check(
     """
     for function in functions:
         for name, got in _evaluate_function(function, stored).items():
-            wanted = stored[name].reshape(got.shape)
-            sizes = find_entry_sizes(name, wanted, least[name])
+            expected = stored[name].reshape(got.shape)
+            sizes = find_entry_sizes(name, expected, least[name])
             reject_if_wrong(
-                f"{function.name}: {name}", (got - wanted) / sizes, np.ones(1), tolerance
+                f"{function.name}: {name}", (got - expected) / sizes, np.ones(1), tolerance
             )
 
 
@@ -142,8 +142,8 @@ def check_against_mechanism(
         FormulationError: A parameter that was taken for one without effect has one.
     """
     plain = Dynamics(model.mechanism, once=True)
-    wanted = plain.compute_torques(stored["q"], stored["dq"], stored["ddq"], model.values)
-    off = (stored["tau"] - wanted) / find_entry_sizes("tau", wanted, least["tau"])
+    expected = plain.compute_torques(stored["q"], stored["dq"], stored["ddq"], model.values)
+    off = (stored["tau"] - expected) / find_entry_sizes("tau", expected, least["tau"])
     reject_if_wrong("the full model", off, np.ones(1))
 
 

@@ -107,8 +107,8 @@ _FITTED = (
 def make_identifier(name: str) -> str:
     """Return a name for files, for Python's module and as the prefix of names in code."""
     word = re.sub(r"[^A-Za-z0-9_]", "_", name)
-    taken = keyword.iskeyword(word) or word in _TAKEN | sys.stdlib_module_names
-    return word if re.match(r"[A-Za-z]", word) and not taken else f"robot_{word}"
+    reserved = keyword.iskeyword(word) or word in _TAKEN | sys.stdlib_module_names
+    return word if re.match(r"[A-Za-z]", word) and not reserved else f"robot_{word}"
 
 
 def make_harmless(text: str) -> str:

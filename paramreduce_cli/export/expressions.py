@@ -23,13 +23,13 @@ class Language:
 
     def write_leaves(self, function: Function) -> dict[int, str]:
         """Return the texts of constants and inputs, by node."""
-        places = function.list_positions(function.arguments)
+        positions = function.list_positions(function.arguments)
         names = {}
         for number, node in enumerate(function.program.nodes):
             if node.operation == "constant":
                 names[number] = self.number(node.number)
             elif node.operation == "input":
-                names[number] = self.element(*places[int(node.number)])
+                names[number] = self.element(*positions[int(node.number)])
         return names
 
     def write_expression(self, names: Mapping[int, str], node: Node) -> str:

@@ -109,5 +109,5 @@ def measure_speeds(models: Mapping[str, RunningModel], states: Mapping[str, Floa
     turns = [
         {name: m.measure_time(*handed[name]) for name, m in models.items()} for _ in range(_TURNS)
     ]
-    least = {name: min(turn[name] for turn in turns) for name in models}
+    least = {name: min(timings[name] for timings in turns) for name in models}
     return Speed(least, next(m.language for m in models.values()))

@@ -28,8 +28,8 @@ def estimate_term_sizes(
     Returns:
         A size in the unit of each result, by its name.
     """
-    turn = float(np.abs(stored["dq"]).sum(axis=1).max())
-    change = float(np.abs(stored["ddq"]).sum(axis=1).max()) + turn**2
+    speed = float(np.abs(stored["dq"]).sum(axis=1).max())
+    change = float(np.abs(stored["ddq"]).sum(axis=1).max()) + speed**2
     reach = mechanism.size + float(np.abs(stored["q"]).max())
     tangent = max(1.0, float(np.abs(stored["R"]).max())) if "R" in stored else 1.0
     fall = float(np.linalg.norm(mechanism.gravity)) + reach * change
@@ -42,7 +42,7 @@ def estimate_term_sizes(
         "delta": float(moments @ values),
         "M": float(inertias @ values),
         "K": float(kept[kept > 0].min()) if kept.any() else 0.0,
-        "gamma": reach * turn**2,
+        "gamma": reach * speed**2,
         "Phi": reach,
         "Phi_z": reach,
         "Phi_d": reach,

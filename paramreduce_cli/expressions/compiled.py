@@ -138,14 +138,14 @@ def find_compiler() -> tuple[str, ...] | None:
         ConfigError: ``$CC`` cannot be split into words.
     """
     try:
-        wanted = shlex.split(os.environ.get("CC", ""))
+        words = shlex.split(os.environ.get("CC", ""))
     except ValueError as error:
         raise ConfigError(
             f"the variable CC holds no command: {error}. Unset it or fix it."
         ) from error
-    names = [wanted[0]] if wanted else ["gcc", "cc"]
+    names = [words[0]] if words else ["gcc", "cc"]
     path = next((path for name in names if (path := shutil.which(name))), None)
-    found = (path, *wanted[1:]) if path is not None else None
+    found = (path, *words[1:]) if path is not None else None
     if found is None:
         warnings.warn(
             "no C compiler found (gcc, cc or $CC): the model runs in CasADi's virtual machine, "

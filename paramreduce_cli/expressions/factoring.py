@@ -86,17 +86,20 @@ def minimise_operations(candidates: Iterable[Values], seed: int = 0) -> Values:
     Returns:
         What takes the fewest operations.
     """
-    apart = [(way, way.to_rows()) for way in candidates]
+    apart = [(candidate, candidate.to_rows()) for candidate in candidates]
     for _, rows in apart:
         rows.counters[DICE] = seed
-    for tries, share in _CLOSE.items():
+    for tries, fraction in _CLOSE.items():
         for _, rows in apart:
             rewrite(rows, int(tries * _count_places(rows)))
-        close = (1 + share) * min(rows.counters[COST] for _, rows in apart)
-        apart = [(way, rows) for way, rows in apart if rows.counters[COST] <= close]
+        close = (1 + fraction) * min(rows.counters[COST] for _, rows in apart)
+        apart = [(candidate, rows) for candidate, rows in apart if rows.counters[COST] <= close]
     for _, rows in apart:
         _rewrite_fully(rows)
-    return min((way.from_rows(rows) for way, rows in apart), key=lambda way: way.n_operations)
+    return min(
+        (candidate.from_rows(rows) for candidate, rows in apart),
+        key=lambda values: values.n_operations,
+    )
 
 
 def _rewrite_fully(rows: Rows) -> None:

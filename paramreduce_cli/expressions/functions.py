@@ -47,24 +47,24 @@ class Function:
 
     def find_used_arguments(self) -> set[str]:
         """Return the names of the arguments that the results depend on."""
-        places = self.list_positions(self.arguments)
+        positions = self.list_positions(self.arguments)
         numbers = (int(n.number) for n in self.program.nodes if n.operation == "input")
-        return {places[number][0].name for number in numbers}
+        return {positions[number][0].name for number in numbers}
 
     def restrict_arguments(self, names: Collection[str]) -> Function:
         """Return the function with some of its arguments only; it uses no others."""
-        places = enumerate(self.list_positions(self.arguments))
-        kept = [position for position, (argument, _) in places if argument.name in names]
+        positions = enumerate(self.list_positions(self.arguments))
+        kept = [position for position, (argument, _) in positions if argument.name in names]
         arguments = tuple(a for a in self.arguments if a.name in names)
         return replace(self, arguments=arguments, program=self.program.renumber(kept.index))
 
     def find_state_dependent(self) -> list[bool]:
         """Return which nodes of the program depend on more than the parameters ``phi``."""
-        places = self.list_positions(self.arguments)
+        positions = self.list_positions(self.arguments)
         found: list[bool] = []
         for node in self.program.nodes:
             if node.operation == "input":
-                found.append(places[int(node.number)][0].name != "phi")
+                found.append(positions[int(node.number)][0].name != "phi")
             else:
                 found.append(any(found[value >> 1] for value in node.operands))
         return found

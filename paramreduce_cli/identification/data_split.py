@@ -39,14 +39,14 @@ def trim_files(pieces: list[Signals], section: LogSection) -> list[Piece]:
     first, last = pieces[0].time[0] + section.trim[0], pieces[-1].time[-1] - section.trim[1]
     if section.standstill == "cut":
         time = np.concatenate([piece.time for piece in pieces])
-        gone, back = [], []
+        starts, ends = [], []
         for j in range(pieces[0].z.shape[1]):
             z = np.concatenate([piece.z[:, j] for piece in pieces])
             still = _STILL * max(np.ptp(z), 1e-12)
-            gone += np.flatnonzero(np.abs(z - z[0]) > still)[:1].tolist()
-            back += np.flatnonzero(np.abs(z - z[-1]) > still)[-1:].tolist()
-        if gone:
-            first, last = max(first, time[min(gone)]), min(last, time[max(back)])
+            starts += np.flatnonzero(np.abs(z - z[0]) > still)[:1].tolist()
+            ends += np.flatnonzero(np.abs(z - z[-1]) > still)[-1:].tolist()
+        if starts:
+            first, last = max(first, time[min(starts)]), min(last, time[max(ends)])
     return [Piece(piece, first, last) for piece in pieces]
 
 

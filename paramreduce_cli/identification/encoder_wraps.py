@@ -22,18 +22,18 @@ def unwrap_positions(z: FloatArray) -> tuple[int, ...]:
         Number of such jumps by column, (n_dof,).
     """
     counts = [0] * z.shape[1]
-    turn = 2 * np.pi
+    revolution = 2 * np.pi
     for j, column in enumerate(z.T):
         steps = np.diff(column)
         large = np.flatnonzero(np.abs(steps) > np.pi)
         if not large.size:
             continue
         usual = _find_usual_steps(steps, large)
-        turns = np.round((usual - steps[large]) / turn)
-        whole = np.abs(steps[large] + turns * turn - usual) < _OFF_A_TURN
+        turns = np.round((usual - steps[large]) / revolution)
+        whole = np.abs(steps[large] + turns * revolution - usual) < _OFF_A_TURN
         turns[~whole] = 0
         added = np.zeros(column.size)
-        added[large + 1] = turns * turn
+        added[large + 1] = turns * revolution
         column += np.cumsum(added)
         counts[j] = int(np.count_nonzero(turns))
     return tuple(counts)

@@ -51,7 +51,7 @@ class Rows:
     dz: tuple[FloatArray, ...]
     ddz: tuple[FloatArray, ...]
     step: float
-    share: float
+    fraction: float
 
     @cached_property
     def n_samples(self) -> int:
@@ -67,15 +67,15 @@ def collect_rows(blocks: Iterable[Block], columns: FloatArray, n_samples: int) -
         columns: Standard parameters by those of the model, (n_standard, p).
         n_samples: Number of samples.
     """
-    share = min(1.0, _MOST_SAMPLES / n_samples)
+    fraction = min(1.0, _MOST_SAMPLES / n_samples)
     parts: dict[tuple[int, int], list[tuple[FloatArray, ...]]] = {}
     step = 0.0
-    wanted = taken = 0.0
+    target = collected = 0.0
     interruptions = 0
     for block in blocks:
-        wanted += share * block.time.size
-        if taken + 0.5 * block.time.size <= wanted or share == 1.0:
-            taken += block.time.size
+        target += fraction * block.time.size
+        if collected + 0.5 * block.time.size <= target or fraction == 1.0:
+            collected += block.time.size
             X = (block.W @ columns).reshape(*block.tau.shape, -1)
             key = (block.trajectory, interruptions)
             parts.setdefault(key, []).append((X, block.tau, block.dz, block.ddz))
@@ -197,7 +197,7 @@ class LinearFit:
     def compute_covariance(self) -> FloatArray:
         """Return the covariance of the parameters, (p, p)."""
         scores = compute_score_covariance(self.rows.X, self.noise, self.weights)
-        result: FloatArray = self._inverse @ scores @ self._inverse * self.rows.share
+        result: FloatArray = self._inverse @ scores @ self._inverse * self.rows.fraction
         return result
 
     def analyse_residuals(self, n_samples: int) -> Residuals:

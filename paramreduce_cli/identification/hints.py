@@ -224,11 +224,11 @@ def _compute_tilt_torques(
 def _hint_at_friction(model: Model, full: Estimate) -> list[str]:
     """Return hints at negative friction among the base parameters."""
     kinds = {p.name: p for p in model.mechanism.parameters if p.kind in _FRICTION}
-    places = [k for k, name in enumerate(full.names) if name in kinds]
-    found = [kinds[full.names[k]] for k in places]
+    indices = [k for k, name in enumerate(full.names) if name in kinds]
+    found = [kinds[full.names[k]] for k in indices]
     return hint_at_negative_friction(
         [p.name for p in found],
         [p.owner for p in found],
-        full.values[places],
-        full.deviations[places],
+        full.values[indices],
+        full.deviations[indices],
     )

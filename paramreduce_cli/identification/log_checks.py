@@ -99,7 +99,7 @@ def _compare_speeds(
     """Yield warnings on recorded speeds that are no derivatives of the positions."""
     slopes = _low_pass((np.gradient(column, 1 / rate) for column in z.T), rate)
     speeds = _low_pass(dz.T, rate)
-    said: dict[str, list[str]] = {}
+    messages: dict[str, list[str]] = {}
     for j, name in enumerate(names):
         lengths = np.linalg.norm(speeds[:, j]) * np.linalg.norm(slopes, axis=0)
         if not lengths[j] > 0:
@@ -108,20 +108,22 @@ def _compare_speeds(
         gain = float(speeds[:, j] @ slopes[:, j] / (slopes[:, j] @ slopes[:, j]))
         other = int(np.argmax(np.abs(alike)))
         if abs(alike[j]) < _UNLIKE and abs(alike[other]) > _SURE:
-            said.setdefault(f"is that of {names[other]}: are columns swapped?", []).append(name)
+            messages.setdefault(f"is that of {names[other]}: are columns swapped?", []).append(name)
         elif alike[j] < -_SURE:
-            said.setdefault("has the other sign than the slope of the position.", []).append(name)
+            messages.setdefault("has the other sign than the slope of the position.", []).append(
+                name
+            )
         elif alike[j] > _SURE and abs(gain / _PER_DEGREE - 1) < _NEAR:
-            said.setdefault(
+            messages.setdefault(
                 "is 57.3 times the slope of the position: is the speed in degrees?", []
             ).append(name)
         elif alike[j] > _SURE and abs(gain * _PER_DEGREE - 1) < _NEAR:
-            said.setdefault(
+            messages.setdefault(
                 "is the slope of the position over 57.3: is the position in degrees?", []
             ).append(name)
         elif alike[j] > _SURE and abs(gain - 1) > 2 * _NEAR:
-            said.setdefault(f"is {gain:.3g} times the slope of the position: units?", []).append(
-                name
-            )
-    for what, joints in said.items():
+            messages.setdefault(
+                f"is {gain:.3g} times the slope of the position: units?", []
+            ).append(name)
+    for what, joints in messages.items():
         yield f"the speed of {_join_names(joints)} {what}"

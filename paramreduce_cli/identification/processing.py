@@ -198,12 +198,12 @@ def _read_files(
             files.warnings += [f"{source}: {text}" for text in jumps]
             if section.delay:
                 _compensate_delay(recorded, section.delay, source)
-            pieces, rate, said = resample_evenly(recorded, parted)
+            pieces, rate, messages = resample_evenly(recorded, parted)
         except DataError as error:
             raise DataError(f"{source}: {error}") from error
         duration = recorded.time[-1] - recorded.time[0]
         steps.append(f"{source}: {rows} rows, {duration:.4g} s at {rate:.5g} Hz.")
-        steps += said
+        steps += messages
         outliers = replace_outliers(pieces) if section.outliers == "replace" else {}
         steps += _describe_outliers(outliers, names)
         if files.rate and abs(rate - files.rate) > _SAME_RATE * files.rate:
@@ -231,28 +231,28 @@ def _cut_out_jumps(
     Returns:
         The recording; its rows with which a motion begins anew after a step; sentences on what was done.
     """
-    said = []
+    messages = []
     if any(recorded.turns):
         counts = zip(names, recorded.turns, strict=True)
         counted = ", ".join(f"{name} {count} times" for name, count in counts if count)
-        said.append(f"positions jump by whole turns ({counted}); the turns are added.")
+        messages.append(f"positions jump by whole turns ({counted}); the turns are added.")
     if section.outliers == "keep":
-        return recorded, [], said
+        return recorded, [], messages
     jumps = find_position_jumps(recorded)
     if jumps.bad.any():
         bad = np.flatnonzero(jumps.bad)
-        said.append(
+        messages.append(
             f"positions jump to and fro, so {bad.size} of {jumps.bad.size} rows are cut out "
             f"({name_rows(bad, first_line)}): dropouts, or a second publisher?"
         )
         recorded = recorded.slice_rows(~jumps.bad)
     if jumps.steps.size:
-        said.append(
+        messages.append(
             f"positions jump and do not come back ({name_rows(jumps.steps, first_line)}), so the log is parted there: "
             "was the zero of a joint set anew, or are these several recordings?"
         )
     parted = jumps.steps - np.cumsum(jumps.bad)[jumps.steps]
-    return recorded, parted.tolist(), said
+    return recorded, parted.tolist(), messages
 
 
 def _compensate_delay(recorded: Signals, delay: float, source: str) -> None:

@@ -46,7 +46,7 @@ class _Signal:
     """Whose residuals; None for all together."""
     signal: tuple[FloatArray, ...]
     """(n_samples, n_dof) for each part."""
-    said: Callable[[float, float], str | None]
+    make_hint: Callable[[float, float], str | None]
     """The sentence for its coefficient and share; None where that is too small to matter."""
 
 
@@ -87,9 +87,9 @@ def find_residual_hints(
         good = [entry for entry in judged if _is_convincing(*entry[:3])]
         if not good:
             break
-        _, share, coefficient, k = max(good, key=lambda entry: entry[1])
+        _, fraction, coefficient, k = max(good, key=lambda entry: entry[1])
         tried.add(k)
-        text = candidates[k].said(coefficient, share)
+        text = candidates[k].make_hint(coefficient, fraction)
         if text is None:
             continue
         found.append(text)

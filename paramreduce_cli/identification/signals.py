@@ -277,21 +277,21 @@ def resample_evenly(
         raise DataError(
             f"no motion of {_FEWEST} samples in a row is left between {gaps.size} gaps in time."
         )
-    said = []
+    messages = []
     if gaps.size:
         longest = float(np.diff(signals.time).max())
-        said.append(
+        messages.append(
             f"{gaps.size} gaps in time, the longest of {longest:.3g} s, part the log; {len(kept)} of "
             f"{len(pieces)} pieces are long enough."
         )
     uneven = max(float(np.abs(np.diff(p.time) - step).max()) for p in kept) / step
     if uneven > _EVEN:
         kept = [_resample(piece, step) for piece in kept]
-        said.append(
+        messages.append(
             f"Time steps differ by up to {100 * uneven:.3g} %; resampled to {1 / step:.6g} Hz by cubic "
             "splines."
         )
-    return kept, 1 / step, said
+    return kept, 1 / step, messages
 
 
 def _resample(signals: Signals, step: float) -> Signals:

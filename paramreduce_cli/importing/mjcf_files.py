@@ -62,11 +62,11 @@ def compile_mjcf(path: Path) -> MjcfReader:
     """
     import mujoco
 
-    said: list[str] = []
+    messages: list[str] = []
     before = mujoco.get_mju_user_warning()
-    mujoco.set_mju_user_warning(said.append)  # which it writes to a file otherwise
+    mujoco.set_mju_user_warning(messages.append)  # which it writes to a file otherwise
     try:
-        return MjcfReader(path, mujoco, mujoco.MjModel.from_xml_path(str(path)), said)
+        return MjcfReader(path, mujoco, mujoco.MjModel.from_xml_path(str(path)), messages)
     except (ValueError, mujoco.FatalError) as error:
         text = " ".join(str(error).split()).rstrip(".")
         raise ConfigError(f"{path}: MuJoCo cannot compile it: {text}.") from error
@@ -125,8 +125,8 @@ class MjcfReader:
                 f"{self._path}: has <flex>, bodies that bend: no rigid-body dynamics."
             )
         joints = tuple(joint for body in range(1, model.nbody) for joint in self._read_joints(body))
-        followers, closures = self._read_equalities()
-        joints = tuple(_add_mimic(joint, followers.get(joint.name)) for joint in joints)
+        mimics, closures = self._read_equalities()
+        joints = tuple(_add_mimic(joint, mimics.get(joint.name)) for joint in joints)
         self._warn_of_losses()
         name = bytes(model.names).split(b"\0")[0].decode(errors="replace")
         weightless = model.opt.disableflags & int(self._mujoco.mjtDisableBit.mjDSBL_GRAVITY)
@@ -276,7 +276,7 @@ class MjcfReader:
             ConfigError: An equality has no rigid-body meaning.
         """
         model, kinds = self._model, self._mujoco.mjtEq
-        followers: dict[str, Mimic] = {}
+        mimics: dict[str, Mimic] = {}
         closures = []
         for k in range(model.neq):
             name, kind = (
@@ -287,7 +287,7 @@ class MjcfReader:
                 self._warnings.append(f"the equality {name} is not active in the file, so left out")
             elif kind == kinds.mjEQ_JOINT:
                 follower, mimic = self._read_coupling(k, name)
-                followers[follower] = mimic
+                mimics[follower] = mimic
             elif kind in (kinds.mjEQ_CONNECT, kinds.mjEQ_WELD) and self._is_moved_from_outside(k):
                 self._warnings.append(
                     f"the equality {name} leads a body by hand, so it is left out"
@@ -300,8 +300,8 @@ class MjcfReader:
                     f"{self._path}: the equality {name} of type {text} has no rigid-body meaning here; "
                     "connect, weld and joint have."
                 )
-        self._check_mimics(followers)
-        return followers, tuple(closures)
+        self._check_mimics(mimics)
+        return mimics, tuple(closures)
 
     def _is_moved_from_outside(self, k: int) -> bool:
         """Return whether an equality ties a body to a body that is moved from outside."""
@@ -320,9 +320,9 @@ class MjcfReader:
         follower, leader = int(model.eq_obj1id[k]), int(model.eq_obj2id[k])
         offset, ratio, *higher = model.eq_data[k, :5].tolist()
         if any(higher) or leader < 0:
-            wanted = "a polynomial" if leader >= 0 else "a joint held at a value"
+            form = "a polynomial" if leader >= 0 else "a joint held at a value"
             raise ConfigError(
-                f"{self._path}: the equality {name} is {wanted}; only offset and ratio are understood. "
+                f"{self._path}: the equality {name} is {form}; only offset and ratio are understood. "
                 f"--lock {self._joints[follower]}=VALUE holds a joint; take the equality out."
             )
         return self._joints[follower], Mimic(self._joints[leader], ratio, offset)

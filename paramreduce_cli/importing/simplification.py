@@ -110,12 +110,12 @@ class SimplifiedRobot:
 
     def find_dependent_limits(self) -> dict[str, ImportedJoint]:
         """Return the joints of the file that limit dependent coordinates of loops, by coordinate."""
-        followers = {coupling.follower.coordinate for coupling in self.couplings}
+        dependent = {coupling.follower.coordinate for coupling in self.couplings}
         return {
             body.coordinate: body.limits
             for body in self.bodies
             if self.closures and body.coordinate is not None and body.limits is not None
-            if body.limits.is_limited and body.coordinate not in {*self.independent, *followers}
+            if body.limits.is_limited and body.coordinate not in {*self.independent, *dependent}
         }
 
 
@@ -153,12 +153,12 @@ class _Simplification:
         """Raise ConfigError if an option names a link or joint that does not exist."""
         choice = self._choice
         links, joints = list(self._robot.links), [joint.name for joint in self._robot.joints]
-        asked = [("--root", choice.root, links), ("--tip", choice.tip, links)]
-        asked += [("--ignore", name, links) for name in choice.ignored]
-        asked += [("--lock", name, joints) for name in choice.locked or {}]
-        asked += [("--close", name, links) for one in self._asked_closures for name in one.links]
-        asked += [("--independent", name, joints) for name in choice.independent]
-        for option, name, known in asked:
+        named = [("--root", choice.root, links), ("--tip", choice.tip, links)]
+        named += [("--ignore", name, links) for name in choice.ignored]
+        named += [("--lock", name, joints) for name in choice.locked or {}]
+        named += [("--close", name, links) for one in self._asked_closures for name in one.links]
+        named += [("--independent", name, joints) for name in choice.independent]
+        for option, name, known in named:
             if name is not None and name not in known:
                 kind = "joint" if option in ("--lock", "--independent") else "link"
                 raise ConfigError(f"{option} {name}: {UnknownNameError(kind, name, known)}")
@@ -323,8 +323,8 @@ class _Simplification:
                 for joint, k in self._robot.independent
                 if joint in moved
             )
-        followers = {coupling.follower.name for coupling in couplings}
-        return tuple(n for b in bodies if b.name not in followers for n in b.list_coordinates())
+        mimics = {coupling.follower.name for coupling in couplings}
+        return tuple(n for b in bodies if b.name not in mimics for n in b.list_coordinates())
 
     def _append_joint(
         self, joint: ImportedJoint, carrier: str, at: Steps, bodies: list[ImportedBody]
@@ -340,9 +340,12 @@ class _Simplification:
         if joint.kind in _SEVERAL:
             bodies.append(ImportedBody(name, carrier, _SEVERAL[joint.kind], at, **own))
         elif joint.kind == "planar":
-            turn = rotate_z_to(np.array(joint.axis))
+            rotation = rotate_z_to(np.array(joint.axis))
             for k, letter in enumerate("xy"):
-                slide, axis = self._names.name_body(f"{name}_{letter}"), tuple(turn[:, k].tolist())
+                slide, axis = (
+                    self._names.name_body(f"{name}_{letter}"),
+                    tuple(rotation[:, k].tolist()),
+                )
                 sliding = f"{coordinate}_{letter}"
                 bodies.append(
                     ImportedBody(slide, carrier, "prismatic", at, axis, sliding, massless=True)
@@ -445,9 +448,9 @@ def _to_steps(joint: ImportedJoint, value: float) -> Steps:
     for k, key in enumerate(("rx", "ry", "rz")):
         if abs(axis[k]) == 1.0:
             return ((key, value * float(axis[k])),)
-    turn = rotate_z_to(axis)
+    rotation = rotate_z_to(axis)
     frame = np.eye(4)
-    frame[:3, :3] = turn
+    frame[:3, :3] = rotation
     return (*decompose_transform(frame), ("rz", value), *decompose_transform(frame.T))
 
 

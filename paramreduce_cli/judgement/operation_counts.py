@@ -69,10 +69,10 @@ class OperationCounts:
             for row in [result.find_row(key.n)]
             if row is not None and np.isfinite(result.operations.inverse[row])
         }
-        asked = {self._structures[key]: self._models[key] for key in shown}
-        missing = [key for key in asked if key not in known]
+        distinct = {self._structures[key]: self._models[key] for key in shown}
+        missing = [key for key in distinct if key not in known]
         if missing:
-            models = [asked[key] for key in missing]
+            models = [distinct[key] for key in missing]
             counts = count_all(self._model, self._counted, models, self._run)
             known |= dict(zip(missing, map(tuple, counts.tolist()), strict=True))
         found = {key: known[name] for key, name in self._structures.items() if name in known}

@@ -25,7 +25,7 @@ def build_mass_matrix(kinematics: Kinematics) -> list[list[Scalar]]:
     for i in reversed(range(n)):
         state = states[i]
         axial, rest = split_axial_part(own[i], kinematics.choices[i], state)
-        composite = state.turn.rotate_inertia(rest) + at_rest[i]
+        composite = state.rotation.rotate_inertia(rest) + at_rest[i]
         wrench = _accelerate_composite(state, composite, zero)
         M[i][i] = _project_on_axis(state, wrench)
         at = i

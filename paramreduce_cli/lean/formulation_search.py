@@ -96,19 +96,19 @@ def _improve_choices(
     """
     choices = list(start)
     waiting = set(range(len(choices)))
-    looks = [0] * len(choices)
+    tries = [0] * len(choices)
     i, piece, graph = 0, None, Graph()
     while waiting:
         i = max((k for k in waiting if k < i), default=max(waiting))
         waiting.remove(i)
-        looks[i] += 1
+        tries[i] += 1
         if pieces[i] is not piece:
             piece, graph = pieces[i], Graph()
             forget()
         found = _improve_joint(i, choices, build, pieces[i], graph, options)
         if found != choices[i]:
             choices[i] = found
-            waiting |= {k for k in _find_neighbours(tree, i) if looks[k] < _LOOKS}
+            waiting |= {k for k in _find_neighbours(tree, i) if tries[k] < _LOOKS}
     return choices
 
 
@@ -191,9 +191,9 @@ def _make_signature(tree: Tree) -> tuple:
     """Return a key for the cache; trees with the same key need the same number of operations."""
 
     def of(joint: Joint) -> tuple:
-        placed = (joint.place.tobytes(), joint.turn.tobytes())
+        placed = (joint.place.tobytes(), joint.rotation.tobytes())
         if joint.parent == BASE:
-            placed = ((joint.turn.T @ tree.gravity).round(12).tobytes(), b"")
+            placed = ((joint.rotation.T @ tree.gravity).round(12).tobytes(), b"")
         moving = (joint.parent, joint.revolute, joint.sign, joint.offset, joint.parallel)
         rigid = [(each.frame.tobytes(), tuple(each.columns.items())) for each in joint.rigid]
         return (*moving, placed, joint.described_to_axis.tobytes(), tuple(rigid))

@@ -109,19 +109,19 @@ def find_formulations(
     useless = everything - set(affecting.nonzero()[0].tolist())
     regrouped = everything - set(base.tolist())
     minor = useless | (everything - _find_main_parameters(tree))
-    asked = [
+    chains = [
         _SearchChain(direct, (_starts(direct)[0],) * len(tree.joints), dropped)
         for direct in (False, True)
         for dropped in ((frozenset(useless), frozenset(regrouped)), (frozenset(minor),))
     ]
     found: dict[_SearchChain, list[_Choices]] = {}
-    total = sum(len(one.dropped) for one in asked)
-    for one, best in _run_searches(mechanism, asked, run.jobs):
+    total = sum(len(one.dropped) for one in chains)
+    for one, best in _run_searches(mechanism, chains, run.jobs):
         found[one] = best
         run.progress(Progress("search for formulations", sum(map(len, found.values())), total))
 
     def all_of(direct: bool) -> tuple[Formulation, ...]:
-        best = [choices for one in asked if one.direct == direct for choices in found[one]]
+        best = [choices for one in chains if one.direct == direct for choices in found[one]]
         same = [(start,) * len(tree.joints) for start in _starts(direct)]
         return tuple(tuple(map(to_data, choices)) for choices in dict.fromkeys(best + same))
 
@@ -189,7 +189,7 @@ def add_formulations(
     everything = frozenset(range(model.affecting.size))
     known = model.formulations.direct if direct else model.formulations.inverse
     starts = [tuple(map(from_data, choices)) for choices in known]
-    asked = []
+    chains = []
     for kept in subsets:
         dropped = everything - frozenset(kept.tolist())
 
@@ -198,10 +198,10 @@ def add_formulations(
             return graph.count_operations(build(tree, choices, graph, dropped))
 
         suited = heapq.nsmallest(_SUITED, starts, key=count)
-        asked += [_SearchChain(direct, start, (dropped,)) for start in suited]
+        chains += [_SearchChain(direct, start, (dropped,)) for start in suited]
     forget()
-    found = dict(_run_searches(model.mechanism, asked, jobs))
-    different = dict.fromkeys([*starts, *(best for one in asked for best in found[one])])
+    found = dict(_run_searches(model.mechanism, chains, jobs))
+    different = dict.fromkeys([*starts, *(best for one in chains for best in found[one])])
     data = tuple(tuple(map(to_data, choices)) for choices in different)
     return replace(model.formulations, **{"direct" if direct else "inverse": data})
 

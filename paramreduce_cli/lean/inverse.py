@@ -52,14 +52,14 @@ def build_torques(kinematics: Kinematics) -> list[Scalar]:
         wrench = rotate_to_rest(wrench, state) + wrench_rest[i]
         if kept := select_part(rest, choice, InertiaPlace.REST):
             wrench = wrench + compute_inertial_wrench(
-                state.turn.rotate_inertia(kept),
+                state.rotation.rotate_inertia(kept),
                 kinematics.express_at_rest(i),
                 state.rest_acceleration,
                 select_gauge(state, choice, InertiaPlace.REST),
             )
         handed = select_part(rest, choice, InertiaPlace.BEFORE)
         if handed:
-            handed = state.turn.rotate_inertia(handed)
+            handed = state.rotation.rotate_inertia(handed)
             wrench = wrench + compute_rotation_wrench(handed, state.joint_turning)
         handed = handed + at_rest[i]
         if state.joint.revolute:
@@ -148,7 +148,7 @@ def select_gauge(state: JointState, choice: JointFormulation, place: InertiaPlac
 
 def rotate_to_rest(wrench: Wrench, state: JointState) -> Wrench:
     """Return a wrench of the body's frame in the frame at rest."""
-    return Wrench(state.turn.to_parent(wrench.force), state.turn.to_parent(wrench.moment))
+    return Wrench(state.rotation.to_parent(wrench.force), state.rotation.to_parent(wrench.moment))
 
 
 def transfer_to_parent(wrench: Wrench, state: JointState) -> Wrench:

@@ -70,16 +70,16 @@ def list_alternatives(choice: JointFormulation, joint: Joint) -> list[JointFormu
     Whether wrenches are projected is for :func:`list_distant_alternatives` alone.
     """
     names = _list_effective_fields(choice, joint)
-    places = tuple(InertiaPlace) if joint.revolute else (InertiaPlace.OWN, InertiaPlace.BEFORE)
+    steps = tuple(InertiaPlace) if joint.revolute else (InertiaPlace.OWN, InertiaPlace.BEFORE)
     single = [
         replace(choice, **{name: value})  # type: ignore[arg-type]
         for name in names
-        for value in (places if name in _PLACED else OPTIONS[name])
+        for value in (steps if name in _PLACED else OPTIONS[name])
     ]
     together = [
         replace(choice, **dict.fromkeys(group, place))  # type: ignore[arg-type]
         for group in _TOGETHER
-        for place in places
+        for place in steps
     ]
     return [c for c in dict.fromkeys(single + together) if c != choice]
 

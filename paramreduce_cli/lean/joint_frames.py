@@ -22,22 +22,22 @@ class Joint:
     """A joint and the body it moves."""
 
     parent: int
-    """Index of the joint before, :data:`BASE` for the base."""
+    """Index of the parent body's joint; :data:`BASE` for the base."""
     revolute: bool
     sign: int
-    """Sign of the coordinate, where z is against the joint's axis as described."""
+    """-1 if the frame's z axis is opposite to the joint's axis as described, else 1."""
     offset: float
-    """Added to the signed coordinate, rad or m."""
+    """Offset added to the signed coordinate, rad or m."""
     place: FloatArray
-    """Origin in the frame of the body before, m, (3,)."""
-    turn: FloatArray
-    """Components in the joint's frame at rest to those in the frame of the body before, (3, 3)."""
+    """Position of the origin in the parent body's frame, m, (3,)."""
+    rotation: FloatArray
+    """Rotation matrix from the joint's frame at rest to the parent body's frame, (3, 3)."""
     parallel: bool
-    """Whether the axis is parallel to that of the joint before, on which its angle can be added."""
+    """Whether the axis is parallel to that of the parent's joint, so that the angles can be added."""
     described_to_axis: FloatArray
     """Homogeneous transform from the body's frame as described to this one, (4, 4), m."""
     rigid: tuple[Rigid, ...]
-    """The body and its payloads; columns are positions among the inputs of all models."""
+    """The moved body and its payloads; their columns are positions among the inputs of all models."""
 
     @property
     def columns(self) -> tuple[int, ...]:
@@ -68,18 +68,18 @@ def choose_frames(mechanism: Mechanism) -> Tree:
         placed = body.parent_to_joint
         if before is not None:
             placed = before.described_to_axis @ placed
-        turn, after, sign = clean_rotation(placed[:3, :3]), body.joint_to_body.copy(), 1
-        parallel = before is not None and not _has_tilt(turn)
-        if parallel and turn[2, 2] < 0:
-            turn, sign = turn @ _FLIP, -1
+        rotation, after, sign = clean_rotation(placed[:3, :3]), body.joint_to_body.copy(), 1
+        parallel = before is not None and not _has_tilt(rotation)
+        if parallel and rotation[2, 2] < 0:
+            rotation, sign = rotation @ _FLIP, -1
             after[:3] = _FLIP @ after[:3]
         offset = sign * body.offset
         if body.joint == "revolute" and before is not None:
-            turn, angle = _split_rotation_about_z(turn)
+            rotation, angle = _split_rotation_about_z(rotation)
             offset += angle
         elif parallel:
-            after[:3] = turn @ after[:3]
-            turn = np.eye(3)
+            after[:3] = rotation @ after[:3]
+            rotation = np.eye(3)
         after[:3, :3] = clean_rotation(after[:3, :3])
         joints.append(
             Joint(
@@ -88,7 +88,7 @@ def choose_frames(mechanism: Mechanism) -> Tree:
                 sign=sign,
                 offset=offset,
                 place=placed[:3, 3],
-                turn=turn,
+                rotation=rotation,
                 parallel=parallel,
                 described_to_axis=after,
                 rigid=mechanism.list_rigid_parts(i),

@@ -93,7 +93,10 @@ class Angle:
 
 @dataclass(frozen=True)
 class JointState:
-    """The kinematics at one joint.
+    """A record of the kinematics at one joint.
+
+    Its frame at rest is the frame that the body's angle is measured against: that of the joint, or, where parallel axes
+    are aligned, that of the first of them.
 
     The frame at rest is the one the body's angle is measured against: that of the joint, or
     where parallel axes are aligned, that of the first of them.
@@ -102,12 +105,12 @@ class JointState:
     joint: Joint
     aligned: bool
     rest_to_parent: ConstantRotation
-    """Rotation from the frame at rest to that of the parent body; unused where aligned."""
+    """Rotation from the frame at rest to that of the parent body; unused if axes are aligned."""
     angle: Angle
-    turn: JointRotation
+    rotation: JointRotation
     """Rotation of the body against the frame at rest."""
     rest_motion: FrameMotion
-    """Motion of the frame at rest, in its components."""
+    """Motion of the frame at rest, in its own components."""
     body_motion: FrameMotion
     """Motion of the body's frame, in its own components."""
     joint_turning: RotationEffect
@@ -115,11 +118,11 @@ class JointState:
     rest_acceleration: Vector
     """Acceleration of the origin less gravity, in the frame at rest."""
     body_acceleration: Vector
-    """The same in the body's frame."""
+    """Acceleration of the origin less gravity, in the body's frame."""
     reach: Vector
     """Vector from the parent's origin: in the parent's frame, or if aligned, in the frame at rest."""
     relative_acceleration: Vector
-    """Acceleration of the origin against the frame before that ``reach`` is given in; at rest."""
+    """Acceleration of the origin relative to the frame that ``reach`` is given in, in the frame at rest."""
 
 
 class Kinematics:
@@ -162,8 +165,8 @@ class Kinematics:
         whole = self.symbols.make_zero_inertia()
         for rigid in joint.rigid:
             frame = joint.described_to_axis @ rigid.frame
-            turn = make_constant_rotation(self.graph, clean_rotation(frame[:3, :3]).tobytes())
-            described = turn.rotate_inertia(self.symbols.read_inertia(rigid))
+            rotation = make_constant_rotation(self.graph, clean_rotation(frame[:3, :3]).tobytes())
+            described = rotation.rotate_inertia(self.symbols.read_inertia(rigid))
             whole = whole + described.move_point(self.symbols.make_vector(frame[:3, 3]))
         return whole
 
@@ -171,14 +174,15 @@ class Kinematics:
         """Return the motion of the frames at joint i; the joints before have theirs."""
         joint, choice = self.tree.joints[i], self.choices[i]
         before = None if joint.parent == BASE else self.states[joint.parent]
-        fixed = make_constant_rotation(self.graph, joint.turn.tobytes())
+        fixed = make_constant_rotation(self.graph, joint.rotation.tobytes())
         place = self.symbols.make_vector(joint.place)
         aligned = before is not None and joint.parallel and choice.aligned
         if aligned and before is not None:
-            rest, reach = before.rest_motion, before.turn.to_parent(place)
+            rest, reach = before.rest_motion, before.rotation.to_parent(place)
             extra = before.joint_turning.multiply(reach)
             a = add(
-                before.rest_acceleration, before.turn.to_parent(before.body_motion.multiply(place))
+                before.rest_acceleration,
+                before.rotation.to_parent(before.body_motion.multiply(place)),
             )
             if choice.reach_turned:
                 a = add(add(before.rest_acceleration, before.rest_motion.multiply(reach)), extra)
@@ -205,20 +209,20 @@ class Kinematics:
             a, extra = add(add(a, sliding), (x, y, z)), add(extra, sliding)
             step = (self._zero, self._zero, distance)
             reach = add(reach, step if aligned else fixed.to_parent(step))
-        turn = make_joint_rotation(angle.sum, angle.offset)
+        rotation = make_joint_rotation(angle.sum, angle.offset)
         return JointState(
             joint=joint,
             aligned=aligned,
             rest_to_parent=fixed,
             angle=angle,
-            turn=turn,
+            rotation=rotation,
             rest_motion=rest,
             body_motion=add_rotation(
-                rest, turn, angle.speed, angle.acceleration, choice.diagonal, choice.rates
+                rest, rotation, angle.speed, angle.acceleration, choice.diagonal, choice.rates
             ),
             joint_turning=make_rotation_effect(rest, angle.speed, angle.acceleration),
             rest_acceleration=a,
-            body_acceleration=turn.to_child(a),
+            body_acceleration=rotation.to_child(a),
             reach=reach,
             relative_acceleration=extra,
         )
@@ -250,14 +254,15 @@ class Kinematics:
         known = self.find_screws(parent)
         if not state.aligned:
             known = {
-                j: (before.turn.to_child(w), before.turn.to_child(v)) for j, (w, v) in known.items()
+                j: (before.rotation.to_child(w), before.rotation.to_child(v))
+                for j, (w, v) in known.items()
             }
         screws = {**known, parent: own}
         moved = {j: (w, add(v, cross(w, state.reach))) for j, (w, v) in screws.items()}
         if state.aligned:
             return moved
-        back = state.rest_to_parent.to_child
-        return {j: (back(w), back(v)) for j, (w, v) in moved.items()}
+        to_child = state.rest_to_parent.to_child
+        return {j: (to_child(w), to_child(v)) for j, (w, v) in moved.items()}
 
     def express_at_rest(self, i: int) -> FrameMotion:
         """Return the motion of a body in the components of its frame at rest."""

@@ -215,9 +215,9 @@ class LeanModels:
         self, variants: _Variants, model: ReducedModel, constant: bool
     ) -> tuple[Values, int]:
         """Return the values of the leanest formulation before rewriting, and its number."""
-        ways = self._specialise_promising(variants, model, constant)
-        settled = [(way.simplify(), number) for number, way in ways.items()]
-        return min(settled, key=lambda way: way[0].n_operations)
+        specialised = self._specialise_promising(variants, model, constant)
+        settled = [(values.simplify(), number) for number, values in specialised.items()]
+        return min(settled, key=lambda entry: entry[0].n_operations)
 
     def _specialise_promising(
         self, variants: _Variants, model: ReducedModel, constant: bool

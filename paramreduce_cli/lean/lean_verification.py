@@ -51,14 +51,14 @@ def check_formulations(
     tree = choose_frames(mechanism)
     dropped = np.setdiff1d(np.arange(phi.size), kept).tolist()
     builds = {"inverse": build_inverse_outputs, "direct": build_direct_outputs}
-    for kind, wanted in expected.items():
+    for kind, torques in expected.items():
         for choices in getattr(formulations, kind):
             graph = Graph()
             outputs = builds[kind](tree, [from_data(data) for data in choices], graph, dropped)
             program = Program.from_graph(*Values(graph, outputs).simplify())
             values = program.evaluate(inputs)
             got = np.column_stack([np.broadcast_to(value, q.shape[0]) for value in values])
-            reject_if_wrong(f"a lean formulation of the {kind} dynamics", got - wanted, wanted)
+            reject_if_wrong(f"a lean formulation of the {kind} dynamics", got - torques, torques)
 
 
 def reject_if_wrong(

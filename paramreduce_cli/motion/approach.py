@@ -115,8 +115,8 @@ class PathPlanner:
             path = [1]
             while path[-1] != 0:
                 path.append(int(before[path[-1]]))
-            legs = list(itertools.pairwise(reversed(path)))
-            for one, other in legs:
+            pairs = list(itertools.pairwise(reversed(path)))
+            for one, other in pairs:
                 if (one, other) in clear:
                     continue
                 try:
@@ -125,7 +125,7 @@ class PathPlanner:
                     lengths[one, other] = lengths[other, one] = np.inf
                     break
             else:
-                return [clear[leg] for leg in legs]
+                return [clear[leg] for leg in pairs]
         return []
 
     def _sample_poses(self, position: FloatArray, other: FloatArray) -> Iterator[FloatArray]:
@@ -150,8 +150,8 @@ class PathPlanner:
         hard = np.maximum(_GENTLE * limits.acceleration, np.abs([start[2], end[2]]).max(axis=0))
         duration = _SHORTEST
         while duration < _LONGEST:
-            way = Segment(duration, _fit_quintic(start, end, duration))
-            z, dz, ddz = way.compute_states(np.linspace(0, duration, _CHECKED))
+            segment = Segment(duration, _fit_quintic(start, end, duration))
+            z, dz, ddz = segment.compute_states(np.linspace(0, duration, _CHECKED))
             slow = (np.abs(dz) <= fast * (1 + _ROUNDING)) & (np.abs(ddz) <= hard * (1 + _ROUNDING))
             if self._is_inside(z) and slow.all():
                 name = self._find_violated_bound(z)
@@ -160,7 +160,7 @@ class PathPlanner:
                         "the move from trajectories.start_pose to the trajectory violates the bounds of {name}; choose another pose."
                     )
                 if self._is_loadable(z, dz, ddz):
-                    return way
+                    return segment
             duration *= _LONGER
         raise _NoPathError(
             "no move from trajectories.start_pose to the trajectory keeps the limits; choose another "

@@ -71,15 +71,15 @@ def sample_motion(
         return TimedMotion(title, names, rate, time, z, dz, ddz, 0.0, period)
     turns = _choose_revolutions(mechanism, trajectories, along, start_pose)
     border = tuple(state[0] for state in along(np.zeros(1)))
-    there, back = (
+    approach, retreat = (
         planner.plan(make_rest_state(start_pose), border),
         planner.plan(border, make_rest_state(start_pose)),
     )
-    lead = sum(way.duration for way in there)
+    lead = sum(segment.duration for segment in approach)
     parts: list[tuple[float, Callable[[FloatArray], State]]] = [
-        *((way.duration, way.compute_states) for way in there),
+        *((segment.duration, segment.compute_states) for segment in approach),
         (period, along),
-        *((way.duration, way.compute_states) for way in back),
+        *((segment.duration, segment.compute_states) for segment in retreat),
     ]
     time, (z, dz, ddz) = _sample_parts(parts, rate)
     return TimedMotion(title, names, rate, time, z, dz, ddz, lead, period)

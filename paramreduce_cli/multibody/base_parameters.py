@@ -92,15 +92,15 @@ def choose_base(
     gap = float(singular[rank - 1] / singular[rank]) if 0 < rank < singular.size else np.inf
 
     compressed: FloatArray = np.linalg.qr(W, mode="r")  # type: ignore[assignment]
-    wanted = preference[np.isin(preference, affecting)]
-    taken = select_independent(compressed, wanted, tolerance)
-    if len(taken) != rank:
+    candidates = preference[np.isin(preference, affecting)]
+    chosen = select_independent(compressed, candidates, tolerance)
+    if len(chosen) != rank:
         raise NumericalError(
-            f"at {tolerance:g} the rank is not clear: {rank} by singular values, {len(taken)} by "
+            f"at {tolerance:g} the rank is not clear: {rank} by singular values, {len(chosen)} by "
             f"columns; the gap at {rank} is {gap:.3g}.",
             Cause.RANK,
         )
-    columns = np.array(taken, dtype=np.int64)
+    columns = np.array(chosen, dtype=np.int64)
     return BaseParameters(columns, compute_regrouping(W, columns, affects), singular, gap)
 
 

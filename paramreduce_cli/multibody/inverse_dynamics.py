@@ -99,15 +99,15 @@ def _propagate_rates(
 
 def _express_inertial_wrench(rigid: Rigid, phi: ca.SX, rates: FrameRates) -> tuple[Vector, Vector]:
     """Return force and moment about the origin of the carrying body that keep a rigid part on its motion."""
-    turn, place = rigid.frame[:3, :3], rigid.frame[:3, 3].tolist()
-    back = turn.T.tolist()
+    rotation, place = rigid.frame[:3, :3], rigid.frame[:3, 3].tolist()
+    to_body = rotation.T.tolist()
     own = FrameRates(
-        apply(back, rates.omega),
-        apply(back, rates.omega_dot),
-        apply(back, rates.accelerate_point(place)),
+        apply(to_body, rates.omega),
+        apply(to_body, rates.omega_dot),
+        apply(to_body, rates.accelerate_point(place)),
     )
     force, moment = _express_body_wrench(rigid, phi, own)
-    force, moment = apply(turn.tolist(), force), apply(turn.tolist(), moment)
+    force, moment = apply(rotation.tolist(), force), apply(rotation.tolist(), moment)
     return force, add(moment, cross(place, force))
 
 

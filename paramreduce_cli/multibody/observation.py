@@ -135,11 +135,11 @@ class ObservedSet:
         """Return the generalised coordinates of a block, and time and position of its end, to continue from there."""
         if self.dynamics.mechanism.loops is None:
             return s.z, before
-        way = s.z if s.fine_positions is None else s.fine_positions
-        finer = way.shape[0] // s.z.shape[0]
-        steps = np.arange(way.shape[0]) / finer
+        positions = s.z if s.fine_positions is None else s.fine_positions
+        finer = positions.shape[0] // s.z.shape[0]
+        steps = np.arange(positions.shape[0]) / finer
         time = np.interp(steps, np.arange(s.time.size), s.time)
-        q = self._coordinates.compute_positions(way, before[1][0] if before[1].size else None)
+        q = self._coordinates.compute_positions(positions, before[1][0] if before[1].size else None)
         times, path = np.concatenate([before[0], time]), np.concatenate([before[1], q])
         self._coordinates.check_motion(times, path)
         return q[::finer], (time[-1:], q[-1:])

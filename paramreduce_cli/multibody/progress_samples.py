@@ -23,7 +23,7 @@ class ProgressSet:
 
     computed: SampleSet
     what: str
-    tell: ProgressCallback
+    on_progress: ProgressCallback
 
     @property
     def n_samples(self) -> int:
@@ -37,7 +37,9 @@ class ProgressSet:
 
     def iterate_blocks(self) -> Iterator[Block]:
         """Yield the samples in order; every call starts anew."""
-        return add_progress(self.computed.iterate_blocks(), self.n_samples, self.what, self.tell)
+        return add_progress(
+            self.computed.iterate_blocks(), self.n_samples, self.what, self.on_progress
+        )
 
     def compute_factors(self) -> FloatArray:
         """Return the triangular factors of [W | tau] per trajectory and joint."""

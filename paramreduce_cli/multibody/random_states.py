@@ -43,8 +43,8 @@ def draw_states(
     least = _NEAREST * float(coordinates.compute_distance(assembly[None])[0])
     moves = rng.uniform(0, 1, size=(count, 1)) * z
     q = np.tile(assembly, (count, 1))
-    for share in _SHARES:
-        reached, _ = coordinates.follow(assembly[independent] + share * moves, q)
+    for fraction in _SHARES:
+        reached, _ = coordinates.follow(assembly[independent] + fraction * moves, q)
         safe = coordinates.compute_distance(reached) >= least
         q[safe] = reached[safe]
     return coordinates.compute_states(q[:, independent], dz, ddz, start=q)

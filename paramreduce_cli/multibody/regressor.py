@@ -34,28 +34,28 @@ def express_regressor(mechanism: Mechanism, columns: Sequence[int] | None = None
         A function of q, dq and ddq, each (n_q,), whose value is K', (n_columns, n_q), with
         tau = K phi.
     """
-    wanted = list(range(mechanism.n_parameters)) if columns is None else list(columns)
+    parameters = list(range(mechanism.n_parameters)) if columns is None else list(columns)
     q, dq, ddq = (ca.MX.sym(name, mechanism.n_q) for name in ("q", "dq", "ddq"))
     states, screws = _propagate_states(mechanism, q, dq, ddq)
     wrench = _make_unit_wrenches()
     parts: list[ca.MX] = []
     order: list[int] = []
     for rigid in mechanism.rigid:
-        present = {kind: c for kind, c in rigid.columns.items() if c in wanted}
+        present = {kind: c for kind, c in rigid.columns.items() if c in parameters}
         if present:
             state = _move_frame(states[rigid.body], rigid.frame)
             parts.append(wrench(*state)[:, [INERTIAL.index(kind) for kind in present]])
             order += present.values()
-    inertial = sorted(order, key=wanted.index)
+    inertial = sorted(order, key=parameters.index)
     wrenches = ca.horzcat(*parts)[:, [order.index(c) for c in inertial]] if parts else ca.MX(6, 0)
     reached = _find_carrying_joints(mechanism)
     maps = wrenches.T @ ca.horzcat(*screws) * ca.MX(ca.sparsify(ca.DM(reached[inertial])))
     driven = {
-        c: row for c, row in _express_drive_rows(mechanism, q, dq, ddq).items() if c in wanted
+        c: row for c, row in _express_drive_rows(mechanism, q, dq, ddq).items() if c in parameters
     }
     rows = ca.vertcat(maps, *driven.values())
     place = {c: k for k, c in enumerate([*inertial, *driven])}
-    function = ca.Function("regressor", [q, dq, ddq], [rows[[place[c] for c in wanted], :]])
+    function = ca.Function("regressor", [q, dq, ddq], [rows[[place[c] for c in parameters], :]])
     return function.expand() if reached[inertial].sum() <= _FLAT else function
 
 

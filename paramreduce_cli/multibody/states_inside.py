@@ -101,9 +101,9 @@ class StatesInside:
             moves = length * rng.uniform(-1, 1, size=(count, lower.size)) * (upper - lower)
             z = q[:, self._independent] + moves
             tried = np.flatnonzero(((z >= lower) & (z <= upper)).all(axis=1))
-            found, way = self._coordinates.follow(z[tried], q[tried])
-            taken = (way == 1) & self._are_inside(found)
-            q[tried[taken]] = found[taken]
+            found, progress = self._coordinates.follow(z[tried], q[tried])
+            accepted = (progress == 1) & self._are_inside(found)
+            q[tried[accepted]] = found[accepted]
         return q[self._are_inside(q)]
 
     def _shorten(self, q: FloatArray, drawn: FloatArray) -> States:

@@ -44,16 +44,16 @@ def group_columns(names: Sequence[str], ranks: IntArray, groups: Sequence[Group]
     tied = {member: group for group in groups if group.tied for member in group.members}
     labels = list(dict.fromkeys(tied[n].name if n in tied else n for n in names))
     column = np.array([labels.index(tied[n].name if n in tied else n) for n in names])
-    wanted = []
+    ranked = []
     for k in range(len(labels)):
         own = set(ranks[column == k].tolist())
-        wanted.append(own.pop() if len(own) == 1 else LAST)
+        ranked.append(own.pop() if len(own) == 1 else LAST)
     together = tuple(
         np.array([labels.index(member) for member in group.members], dtype=np.int64)
         for group in groups
         if not group.tied
     )
-    return GroupedColumns(Columns(tuple(labels), column), order_by_preference(wanted), together)
+    return GroupedColumns(Columns(tuple(labels), column), order_by_preference(ranked), together)
 
 
 def merge_factor(factor: FloatArray, columns: Columns) -> FloatArray:

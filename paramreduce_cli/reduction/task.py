@@ -77,10 +77,10 @@ class FoundSubsets:
 
 def run(heuristic: str, task: SelectionTask) -> FoundSubsets:
     """Run a heuristic by its name, unless the same was asked of it before: several begin with others."""
-    asked = (heuristic, task.objective, task.limit, task.smallest, task.effort)
-    if asked not in task.known:
-        task.known[asked] = heuristics[heuristic](task)
-    return task.known[asked]
+    key = (heuristic, task.objective, task.limit, task.smallest, task.effort)
+    if key not in task.known:
+        task.known[key] = heuristics[heuristic](task)
+    return task.known[key]
 
 
 def make_nested(task: SelectionTask, order: Subset) -> FoundSubsets:

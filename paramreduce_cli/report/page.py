@@ -76,7 +76,7 @@ def render_page(
         if items[section] or section is PageSection.PAPER
     ]
     page = environment.from_string(_read_text("page.html"))
-    told, bibtex = write_methods(data)
+    methods, bibtex = write_methods(data)
     return page.render(
         title=data.title,
         style=_read_text("uplot/uPlot.min.css") + _read_text("page.css"),
@@ -86,7 +86,7 @@ def render_page(
         sections=sections,
         warnings=[(stage, text) for stage, texts in provenance.warnings.items() for text in texts],
         settings=json.dumps(provenance.settings, indent=2, ensure_ascii=False),
-        methods=told,
+        methods=methods,
         bibtex=bibtex,
         code=_make_archive(code) if code else "",
         **context,

@@ -69,8 +69,8 @@ class Animation:
 def make_animation(model: Model, motions: Mapping[str, FloatArray]) -> Animation:
     """Return the mechanism along motions, each of generalised coordinates (n_frames, n_q)."""
     frames = [make_skeleton(model, row) for q in motions.values() for row in q]
-    places = np.array([one.poses[:, :3, 3] for one in frames])
-    half = _AXIS * float(np.ptp(places.reshape(-1, 3), axis=0).max()) or _AXIS
+    positions = np.array([one.poses[:, :3, 3] for one in frames])
+    half = _AXIS * float(np.ptp(positions.reshape(-1, 3), axis=0).max()) or _AXIS
     points = [
         np.vstack([np.zeros((1, 3)), one.joints[:, :3, 3], one.poses[:, :3, 3], one.masses, *one.closures,
                    *(one.joints[:, :3, 3] + side * half * one.joints[:, :3, 2] for side in (-1, 1))])
@@ -133,8 +133,8 @@ def _iterate_closure_paths(
         bodies: list[int] = []
         for body, frame in zip(closure.bodies, closure.frames, strict=True):
             pose = np.eye(4) if body == BASE else poses[body]
-            way = [pose[:3, 3], (pose @ frame)[:3, 3]]
-            ends = way[1:] if body == BASE else way
+            path = [pose[:3, 3], (pose @ frame)[:3, 3]]
+            ends = path[1:] if body == BASE else path
             own = [] if body == BASE else [body]
             bodies += own if not points else [BASE, *own]
             points += ends if not points else ends[::-1]

@@ -40,10 +40,10 @@ class DHJoint(Section):
         each.
         """
         branch = rotate_z(self.gamma) @ translate(0.0, 0.0, self.b)
-        turn, shift = rotate_x(self.alpha), translate(self.a, 0.0, 0.0)
+        rotation, shift = rotate_x(self.alpha), translate(self.a, 0.0, 0.0)
         if convention == "modified":
-            return branch @ turn @ shift @ self._compute_constant_part(), np.eye(4)
-        return branch @ self._compute_constant_part(), shift @ turn
+            return branch @ rotation @ shift @ self._compute_constant_part(), np.eye(4)
+        return branch @ self._compute_constant_part(), shift @ rotation
 
     def _compute_constant_part(self) -> FloatArray:
         """Return the transform of d or theta, whichever the coordinate does not change; both act along z, so the order

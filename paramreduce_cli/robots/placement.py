@@ -93,8 +93,8 @@ def compose_steps(steps: Sequence[Step]) -> FloatArray:
     for step in steps:
         if step.xyz is not None:
             result = result @ translate(*step.xyz)
-        for key, turn in turns.items():
+        for key, rotation in turns.items():
             angle = getattr(step, key)
             if angle is not None:
-                result = result @ turn(angle)
+                result = result @ rotation(angle)
     return result

@@ -133,15 +133,15 @@ class TreeBody(Section):
         placement = compose_steps(self.at)
         for k, (kind, axis) in enumerate(motions):
             last = k == len(motions) - 1
-            turn = np.eye(4)
-            turn[:3, :3] = rotate_z_to(axis)
+            rotation = np.eye(4)
+            rotation[:3, :3] = rotate_z_to(axis)
             chain.append(
                 Body(
                     name=self.name if last else f"{self.name}:{k + 1}",
                     parent=parent if k == 0 else start + k - 1,
                     joint=kind,
-                    parent_to_joint=placement @ turn,
-                    joint_to_body=turn.T,
+                    parent_to_joint=placement @ rotation,
+                    joint_to_body=rotation.T,
                     coordinate=coordinates[k],
                     intermediate=not last,
                 )
@@ -336,9 +336,9 @@ class TreeDescription(BodiesDescription):
         for k, section in enumerate(self.closures):
             number = section.length or section.ratio
             kind = f"{section.type} {number:g}" if number else section.type
-            places = "; ".join(_format_placement(compose_steps(frame)) for frame in section.at)
+            positions = "; ".join(_format_placement(compose_steps(frame)) for frame in section.at)
             name, bodies = section.name or f"loop_{k + 1}", " - ".join(section.bodies)
-            table.append((name, bodies, f"closure: {kind}", "", places, ""))
+            table.append((name, bodies, f"closure: {kind}", "", positions, ""))
         return tuple(table)
 
 

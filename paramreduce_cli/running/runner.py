@@ -286,12 +286,12 @@ class Runner:
 
     def _load_artifact(self, entry: StageInput, inputs: Inputs) -> Any:
         """Return an artifact, and note its digest; None if it is optional and this config does not make it."""
-        brought = self.samples if entry.type is Samples else None
-        path = brought or self.store.get_path(entry.type)
+        supplied = self.samples if entry.type is Samples else None
+        path = supplied or self.store.get_path(entry.type)
         if entry.optional and not self._is_expected(entry.type):
             return None
-        robot = self.config.robot if self.config is not None and brought is None else None
-        maker = "" if brought else find_maker(entry.type).name
+        robot = self.config.robot if self.config is not None and supplied is None else None
+        maker = "" if supplied else find_maker(entry.type).name
         record, stamp = load_file(path, entry.type, robot, maker)
         inputs.digests[get_file(entry.type)] = stamp.digest if stamp else digest_file(path)
         return record
@@ -320,15 +320,15 @@ class Runner:
         for record in self._list_upstream(stage):
             if text := self.describe_mismatch(record):
                 run = f"`paramreduce run {self.arguments}`".replace(" `", "`")
-                again = f"{run} rebuilds it" if self.config is not None else "make it again"
-                self.callbacks.warn(f"{text}; {again}")
+                remedy = f"{run} rebuilds it" if self.config is not None else "make it again"
+                self.callbacks.warn(f"{text}; {remedy}")
 
     def _list_upstream(self, stage: Stage) -> list[type]:
         """Return the records that a stage's artifact comes from, each after those that it is made from."""
         records: dict[type, None] = {}
         for entry in stage.artifacts:
-            brought = entry.type is Samples and self.samples is not None
-            if not brought and (not entry.optional or self._is_expected(entry.type)):
+            supplied = entry.type is Samples and self.samples is not None
+            if not supplied and (not entry.optional or self._is_expected(entry.type)):
                 records |= dict.fromkeys(self._list_upstream(find_maker(entry.type)))
                 records[entry.type] = None
         return list(records)
@@ -402,5 +402,5 @@ class Runner:
             if stamp is not None and stage.output is not Report:
                 seconds[stage.name] = stamp.seconds
                 warnings[stage.name] = stamp.warnings
-        wanted = self.config or self.settings or Settings()
-        return make_provenance(wanted, self._robot, seconds, warnings, self.arguments)
+        settings = self.config or self.settings or Settings()
+        return make_provenance(settings, self._robot, seconds, warnings, self.arguments)

@@ -203,10 +203,10 @@ def load_sweep(path: Path) -> Sweep:
     Raises:
         ConfigError: It is no such list, two runs would have one name, or a config cannot be used.
     """
-    wanted = load_section(path, SweepSection)
-    folder = _resolve_beside(path, wanted.results)
+    section = load_section(path, SweepSection)
+    folder = _resolve_beside(path, section.results)
     runs: dict[str, SweepRun] = {}
-    for run in _iterate_runs(path, wanted, folder):
+    for run in _iterate_runs(path, section, folder):
         if run.name in runs:
             raise ConfigError(
                 f"{path}: two runs are called {run.name}: {runs[run.name].path} and {run.path}. Give their files "
@@ -216,7 +216,7 @@ def load_sweep(path: Path) -> Sweep:
     first = {(run.path, run.variant): run for run in reversed(runs.values())}
     for run in first.values():  # seeds change nothing that could be wrong
         _check_config(path, run)
-    return Sweep(path, runs, wanted.parts, folder)
+    return Sweep(path, runs, section.parts, folder)
 
 
 def _check_config(path: Path, run: SweepRun) -> None:

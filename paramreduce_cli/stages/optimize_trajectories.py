@@ -41,22 +41,22 @@ def optimize_trajectories(
 
     Each trajectory is an item, which is kept at once: an interrupted run goes on with what is missing.
     """
-    wanted = trajectories
-    period = wanted.period if coefficients is None else coefficients.period
-    task = make_task(wanted, model, period)
+    settings = trajectories
+    period = settings.period if coefficients is None else coefficients.period
+    task = make_task(settings, model, period)
     if coefficients is None:
-        sets = _optimise_sets(wanted, task, items, run)
+        sets = _optimise_sets(settings, task, items, run)
     else:
-        sets = _evaluate_coefficients(wanted, model, task, coefficients)
-    motions = _find_point_to_point(wanted, task, model, period, sets)
+        sets = _evaluate_coefficients(settings, model, task, coefficients)
+    motions = _find_point_to_point(settings, task, model, period, sets)
     return Trajectories(
         period=period,
-        points=wanted.points,
-        criterion=wanted.criterion if coefficients is None else "brought",
-        scaling=wanted.scaling,
-        use_full_range=wanted.use_full_range,
-        rest_to_rest=wanted.rest_to_rest,
-        source="" if wanted.file is None else wanted.file.name,
+        points=settings.points,
+        criterion=settings.criterion if coefficients is None else "brought",
+        scaling=settings.scaling,
+        use_full_range=settings.use_full_range,
+        rest_to_rest=settings.rest_to_rest,
+        source="" if settings.file is None else settings.file.name,
         limits=task.settings.limits,
         constraints=task.constraints,
         test_point_to_point=motions,

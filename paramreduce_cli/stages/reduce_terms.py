@@ -139,10 +139,13 @@ def _search(task: _Task, name: str) -> TermModel | None:
     if found.cut_short:
         _warn_of_time_limit(name)
     fitted = judge.decimate(samples.estimation, _FITTED)
-    way = [EvaluatedProgram.judge(one.refit(fitted, budget), judge, budget) for one in found.front]
+    evaluated = [
+        EvaluatedProgram.judge(one.refit(fitted, budget), judge, budget) for one in found.front
+    ]
     ends = (one.refit(fitted, budget) for one in found.ends)
     records = (
-        _make_record(one, judge, way, lean) for one in _iterate_within_budget(ends, judge, budget)
+        _make_record(one, judge, evaluated, lean)
+        for one in _iterate_within_budget(ends, judge, budget)
     )
     term = next((record for record in records if record is not None), None)
     if term is not None and not np.isfinite(budget.acceleration):
@@ -156,7 +159,7 @@ class EvaluatedProgram:
 
     program: Simplified
     errors: tuple[Errors, Errors]
-    strain: float
+    total_cost: float
     """The largest as a share of the budget."""
 
     @classmethod
@@ -168,7 +171,7 @@ class EvaluatedProgram:
     @property
     def rank(self) -> tuple[int, float]:
         """Operations, then the worst ratio to the budget; less is better."""
-        return self.program.program.n_operations, self.strain
+        return self.program.program.n_operations, self.total_cost
 
 
 def _iterate_within_budget(
@@ -184,9 +187,9 @@ def _iterate_within_budget(
     for _, alike in groupby(ends, lambda one: one.program.n_operations):
         judged = sorted(
             (EvaluatedProgram.judge(one, judge, budget) for one in alike),
-            key=lambda one: one.strain,
+            key=lambda one: one.total_cost,
         )
-        yield from (one for one in judged if one.strain <= 1)
+        yield from (one for one in judged if one.total_cost <= 1)
 
 
 def _choose_samples(
@@ -290,7 +293,7 @@ def _make_front(programs: list[EvaluatedProgram], judge: Evaluator) -> TermFront
     """Return the Pareto front of programs by operations and worst ratio to the budget."""
     kept: list[EvaluatedProgram] = []
     for one in sorted(programs, key=lambda one: one.rank):
-        if not kept or one.strain < kept[-1].strain:
+        if not kept or one.total_cost < kept[-1].total_cost:
             kept.append(one)
     errors = np.array([one.errors for one in kept])
     test = np.array([judge.compute_test_errors(one.program) for one in kept])

@@ -241,10 +241,10 @@ def _choose_poses(section: ReportSection, model: Model, motion: ShownMotion) -> 
         ConfigError: A pose of the config cannot be used.
     """
     if section.poses is not None:
-        wanted = [expand_per_joint(pose, model.mechanism.n_dof) for pose in section.poses]
+        poses = [expand_per_joint(pose, model.mechanism.n_dof) for pose in section.poses]
         coordinates = Coordinates(model.mechanism, once=True)
         try:
-            return [coordinates.compute_states(*[z[None]] * 3)[0][0] for z in wanted]
+            return [coordinates.compute_states(*[z[None]] * 3)[0][0] for z in poses]
         except DataError as error:
             raise ConfigError(str(error), ("report", "poses")) from error
     picks = np.linspace(0, motion.time.size, _POSES, endpoint=False).astype(int)

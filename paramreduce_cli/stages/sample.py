@@ -110,10 +110,10 @@ def sample(
     stored = _combine_items(computed, items, report_progress)
     if stored is not None:
         return _make_samples(sampling, model, stored["estimation"], stored)
-    told = {
+    progress = {
         name: ProgressSet(one, f"{name} set", report_progress) for name, one in computed.items()
     }
-    return _make_samples(sampling, model, computed["estimation"], told)
+    return _make_samples(sampling, model, computed["estimation"], progress)
 
 
 def _combine_items(
@@ -197,11 +197,11 @@ def _complete_series(
     for coefficients in series:
         basis = evaluate_basis(period, (coefficients.shape[1] - 1) // 2, times)
         z, dz, ddz = basis.evaluate(coefficients)
-        excess = np.max([limits.lower - z, z - limits.upper, np.abs(dz) - limits.velocity])
-        if excess <= _IMAGE_ROUNDING:
+        violation = np.max([limits.lower - z, z - limits.upper, np.abs(dz) - limits.velocity])
+        if violation <= _IMAGE_ROUNDING:
             q, _, _ = coordinates.compute_states(z, dz, ddz)
-            excess = quantities.compute_rows(q).max(initial=-np.inf)
-        if excess > _IMAGE_ROUNDING:
+            violation = quantities.compute_rows(q).max(initial=-np.inf)
+        if violation > _IMAGE_ROUNDING:
             raise ConfigError(
                 "the image of a trajectory leaves the limits or constraints under trajectories, so "
                 "that this is no symmetry of the mechanism and its limits.",
@@ -256,8 +256,8 @@ def _sample_recording(
         recording = replace(
             recording, tau=_compute_measured_torques(model, recording.source, recording.tau)
         )
-    begun = np.flatnonzero(np.diff(recording.time) < 0) + 1
-    starts = np.concatenate([[0], begun, [recording.time.size]])
+    restarts = np.flatnonzero(np.diff(recording.time) < 0) + 1
+    starts = np.concatenate([[0], restarts, [recording.time.size]])
     return ObservedSet(
         make_spans(np.diff(starts)),
         _read_recorded_states(recording, starts),
@@ -355,8 +355,8 @@ def _compute_measured_torques(model: Model, source: str, tau: FloatArray) -> Flo
     Raises:
         DataError: Torques of a joint are missing or not finite.
     """
-    wanted = np.isfinite(model.nominal_torque)
-    for j in np.flatnonzero(wanted & np.isnan(tau).any(axis=0)).tolist():
+    measured = np.isfinite(model.nominal_torque)
+    for j in np.flatnonzero(measured & np.isnan(tau).any(axis=0)).tolist():
         lost = np.flatnonzero(np.isnan(tau[:, j]))
         name = model.mechanism.coordinate_names[j]
         if lost.size == tau.shape[0]:
@@ -368,7 +368,7 @@ def _compute_measured_torques(model: Model, source: str, tau: FloatArray) -> Flo
             f"{source}: tau{j + 1} is not a finite number in data row {lost[0] + 1}. Remove such rows, "
             f"or name {name} under unmeasured in the config."
         )
-    return np.where(wanted, tau, 0.0)
+    return np.where(measured, tau, 0.0)
 
 
 def _iterate_states(series: list[FloatArray], period: float, points: int, finer: int) -> StatesAt:
@@ -389,10 +389,10 @@ def _iterate_states(series: list[FloatArray], period: float, points: int, finer:
     def at(span: Span) -> StateBlock:
         coefficients = shift_start(series[span.trajectory], period, times[span.start])
         own, between = basis((coefficients.shape[1] - 1) // 2, span.stop - span.start)
-        way = None if between is None else between.evaluate(coefficients)[0]
+        positions = None if between is None else between.evaluate(coefficients)[0]
         states = own.evaluate(coefficients)
         return StateBlock(
-            span.trajectory, times[span.start : span.stop], *states, fine_positions=way
+            span.trajectory, times[span.start : span.stop], *states, fine_positions=positions
         )
 
     return at

@@ -176,12 +176,12 @@ def _check_without_model(judging: ValidationSection, section: SelectedSection) -
     Raises:
         ConfigError: An error of accelerations, or a number of operations, is asked for.
     """
-    asked: list[Key] = [
+    keys: list[Key] = [
         (*key, name)
         for key, limits in ((("selected",), section), (("validation", "accept"), judging.accept))
         for name in limits.model_dump(exclude_none=True)
     ]
-    for key in asked:
+    for key in keys:
         if str(key[-1]).startswith(("acceleration_error", "operations")):
             raise ConfigError(
                 "user-supplied samples hold torques only, and this needs a model of the robot.", key

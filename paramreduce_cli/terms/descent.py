@@ -93,7 +93,7 @@ class Candidate:
     units: FloatArray
     """Sizes of the units of its parameters, SI, (n,)."""
     cost: float
-    excess: float
+    worst_ratio: float
 
 
 @dataclass(frozen=True)
@@ -228,7 +228,7 @@ class Descent:
     def _note(self, step: Step) -> None:
         """Remember a program."""
         known = self.visited.get(step.count)
-        if known is None or step.fit.worst_ratio < known.excess:
+        if known is None or step.fit.worst_ratio < known.worst_ratio:
             fit = step.fit
             passed = Candidate(
                 self.search.tape, fit.pruning, fit.beta, self.units, fit.cost, fit.worst_ratio
@@ -265,8 +265,8 @@ def continue_on_samples(
 def find_leanest_histories(histories: Iterable[SearchHistory], number: int) -> list[SearchHistory]:
     """Return at most ``number`` histories, those with the fewest operations at their ends, one of each different end."""
     different: dict[tuple[int, float], SearchHistory] = {}
-    for way in histories:
-        different.setdefault(way.rank, way)
+    for history in histories:
+        different.setdefault(history.rank, history)
     return [different[rank] for rank in sorted(different)[:number]]
 
 
@@ -286,31 +286,31 @@ def drop_candidates(histories: Sequence[SearchHistory], number: int) -> list[Sea
         histories: Histories in any order, which is kept.
         number: Number of the leanest histories that stay complete.
     """
-    whole = {id(way) for way in find_leanest_histories(histories, number)}
+    whole = {id(entry) for entry in find_leanest_histories(histories, number)}
     costs: dict[int, float] = {}
-    for way in histories:
-        for count, passed in way.visited.items():
+    for entry in histories:
+        for count, passed in entry.visited.items():
             costs[count] = min(passed.cost, costs.get(count, np.inf))
 
     def best(history: SearchHistory) -> SearchHistory:
         some = {count: one for count, one in history.visited.items() if one.cost <= costs[count]}
         return replace(history, visited=some)
 
-    return [way if id(way) in whole else best(way) for way in histories]
+    return [entry if id(entry) in whole else best(entry) for entry in histories]
 
 
 def list_front(histories: Iterable[SearchHistory]) -> list[Simplified]:
     """Return programs of histories that no leaner program beats, a few of them, evenly spread."""
     entries = [
-        (count, max(passed.cost, _EXACT), way)
-        for way in histories
-        for count, passed in way.visited.items()
+        (count, max(passed.cost, _EXACT), history)
+        for history in histories
+        for count, passed in history.visited.items()
     ]
     kept: list[tuple[int, SearchHistory]] = []
     least_cost = np.inf
-    for count, cost, way in sorted(entries, key=lambda entry: entry[:2]):
+    for count, cost, history in sorted(entries, key=lambda entry: entry[:2]):
         if cost < least_cost:
             least_cost = cost
-            kept.append((count, way))
+            kept.append((count, history))
     picks = np.unique(np.linspace(0, len(kept) - 1, min(_ON_THE_WAY, len(kept))).astype(int))
-    return [way.rebuild(way.visited[count]) for count, way in (kept[i] for i in picks)]
+    return [history.rebuild(history.visited[count]) for count, history in (kept[i] for i in picks)]

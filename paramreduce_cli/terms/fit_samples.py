@@ -78,7 +78,7 @@ class TermSamples:
         """Return the torques minus those of a program, (n_dof, n_samples)."""
         rows, columns = self._find_positions
         torques = np.zeros(self.ddq.shape)
-        for place, value in zip(outputs.places.tolist(), outputs.values, strict=True):
+        for place, value in zip(outputs.positions.tolist(), outputs.values, strict=True):
             if place >= rows.size:
                 torques[place - rows.size] += value
                 continue
@@ -94,11 +94,15 @@ class TermSamples:
     def build_mass_matrices(self, outputs: Outputs) -> FloatArray:
         """Return the mass matrices of the independent coordinates, (n_samples, n_dof, n_dof)."""
         rows, columns = self._find_positions
-        number = int(np.searchsorted(outputs.places, rows.size))
-        lower, places = outputs.values[:number], outputs.places[:number]
+        number = int(np.searchsorted(outputs.positions, rows.size))
+        lower, positions = outputs.values[:number], outputs.positions[:number]
         if self._across is None:
-            return np.asarray(_build_symmetric(lower, rows[places], columns[places], len(self.ddq)))
-        return np.asarray(_project_symmetric(lower, rows[places], columns[places], self._across))
+            return np.asarray(
+                _build_symmetric(lower, rows[positions], columns[positions], len(self.ddq))
+            )
+        return np.asarray(
+            _project_symmetric(lower, rows[positions], columns[positions], self._across)
+        )
 
     def invert_mass_matrices(self, outputs: Outputs) -> FloatArray | None:
         """Return the inverses of the mass matrices, (n_samples, n_dof, n_dof); None for the inverse dynamics, or if a

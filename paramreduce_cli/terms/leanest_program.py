@@ -94,7 +94,7 @@ def simplify(
     if smallest is None:
         return Found([], [])
     begins = _list_first(searcher, order_by_estimate(starts, smallest.model.n))
-    told = _ProgressMeter(progress, len(begins) + 2 * max_rounds + _CLOSELY)
+    meter = _ProgressMeter(progress, len(begins) + 2 * max_rounds + _CLOSELY)
 
     def beside(ends: Sequence[SearchHistory], turn: int) -> NearbyStart:
         rng = np.random.default_rng([searcher.seed, turn, 1])
@@ -106,13 +106,13 @@ def simplify(
         best = find_leanest_histories(ends, _BEST)
         return Restart(best[turn % len(best)], turn)
 
-    pays = told.ahead * _estimate_work(searcher, begins) > _MANY
-    with start_searchers(searcher, jobs if pays else 1, told, deadline) as working:
+    pays = meter.ahead * _estimate_work(searcher, begins) > _MANY
+    with start_searchers(searcher, jobs if pays else 1, meter, deadline) as working:
         ends = working.map(Searcher.descend, [one.start for one in begins])
-        ends = _descend_further(working, ends, Searcher.descend_nearby, beside, max_rounds, told)
-        ends = _descend_further(working, ends, Searcher.repeat_descent, before, max_rounds, told)
+        ends = _descend_further(working, ends, Searcher.descend_nearby, beside, max_rounds, meter)
+        ends = _descend_further(working, ends, Searcher.repeat_descent, before, max_rounds, meter)
         best = find_leanest_histories(ends, _CLOSELY)
-        told.ahead = len(best)
+        meter.ahead = len(best)
         close = working.map(Searcher.descend_closely, best, however_late=True)
     last = heapq.nsmallest(
         _LEANEST, ((count, k) for k, one in enumerate(close) for count in one.visited)
@@ -163,12 +163,12 @@ def _descend_further(
         patience: Number of descents that may bring nothing.
         meter: Progress meter.
     """
-    turn = since = 0
+    first = since = 0
     fewest = _find_fewest(ends)
     while since < patience and working.is_in_time():
-        turns = range(turn, turn + min(_AT_ONCE, patience - since))
+        turns = range(first, first + min(_AT_ONCE, patience - since))
         ends = drop_candidates(ends + working.map(work, [item(ends, k) for k in turns]), _CLOSELY)
-        turn, since = turns.stop, since + len(turns)
+        first, since = turns.stop, since + len(turns)
         saved = fewest - _find_fewest(ends)
         if saved and saved * _HARDLY >= fewest:
             meter.expect(since)
@@ -177,7 +177,7 @@ def _descend_further(
 
 
 def _find_fewest(ends: Iterable[SearchHistory]) -> int:
-    return min(way.fewest for way in ends)
+    return min(history.fewest for history in ends)
 
 
 def _list_first(searcher: Searcher, starts: Iterable[Start]) -> list[Descent]:

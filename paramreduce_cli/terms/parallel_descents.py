@@ -161,11 +161,11 @@ class WorkerGroup:
         """
         in_time = partial(_work_in_time, work, math.inf if however_late else self._deadline)
         found: dict[int, SearchHistory] = {}
-        for (number, _), (begun, way) in self._pool.map_unordered(in_time, enumerate(items)):
-            self.cut_short |= not begun
-            self._told(way)
-            if way is not None:
-                found[number] = way
+        for (number, _), (started, history) in self._pool.map_unordered(in_time, enumerate(items)):
+            self.cut_short |= not started
+            self._told(history)
+            if history is not None:
+                found[number] = history
         return [found[number] for number in sorted(found)]
 
 

@@ -43,13 +43,13 @@ class Budget:
 class Costs:
     """The costs of changes of rows: what they add to the sum of squares, to first order."""
 
-    again: FloatArray
-    """The parameters fitted again: exactly where they change by multiples of one combination of them,
-    otherwise to columns as they were, (k,)."""
-    plain: FloatArray
-    """The parameters as they are, (k,)."""
+    refitted: FloatArray
+    """Costs if the parameters are fitted again, (k,). They are exact if the rows change by multiples of one combination
+    of parameters; otherwise the columns are taken as unchanged."""
+    unfitted: FloatArray
+    """Costs if the parameters keep their values, (k,)."""
     sure: FloatArray
-    """Fitted again where that is exact, otherwise as they are, (k,)."""
+    """Costs after fitting again where that is exact, otherwise with the parameters as they are, (k,)."""
 
 
 @dataclass(frozen=True)
@@ -84,7 +84,7 @@ class Linear:
         C = self._project(changes)
         explained = np.einsum("cn,cn->c", C, C)
         plain = size + 2 * along
-        again, sure = plain - explained, plain.copy()
+        exact, sure = plain - explained, plain.copy()
         (one,) = np.nonzero(combinations.any(axis=1))
         # With a the combination, columns become W - d a': the residual is least, over the multiple s of
         # what a' beta was, at r + s d's part out of reach, and e (1 - s) + s C along the direction of a.
@@ -93,10 +93,10 @@ class Linear:
         e = combinations[one] @ beta / lengths
         t = e - np.einsum("cn,cn->c", C[one], directions) / lengths
         left = t**2 + np.maximum(size[one] - explained[one], 0.0)
-        gone = left <= _NOTHING * (e**2 + size[one])
-        regained = (e * t - along[one]) ** 2 / np.where(gone, 1.0, left)
-        again[one] = sure[one] = e**2 - np.where(gone, 0.0, regained)
-        return Costs(again, plain, sure)
+        explained_fully = left <= _NOTHING * (e**2 + size[one])
+        regained = (e * t - along[one]) ** 2 / np.where(explained_fully, 1.0, left)
+        exact[one] = sure[one] = e**2 - np.where(explained_fully, 0.0, regained)
+        return Costs(exact, plain, sure)
 
     def _project(self, changes: FloatArray) -> FloatArray:
         """Return changes in the orthonormal basis of the columns, (k, n_parameters)."""
@@ -205,10 +205,10 @@ class Fitting:
         """Return the fit with its cost, its worst ratio to the budget, and whether it is within the budget."""
         shares = self._compute_ratios(errors)
         cost = float(np.sum(np.minimum(shares, _LARGEST) ** 2))
-        strain = cost
+        total = cost
         if self._watched is not None and max(shares) <= 1.0:
             watched = self._compute_ratios(self.compute_errors(pruning, beta, self._watched))
-            strain += float(np.sum(np.minimum(watched, _LARGEST) ** 2))
+            total += float(np.sum(np.minimum(watched, _LARGEST) ** 2))
             shares += watched
         if self._poses is not None and max(shares) <= 1.0:
             masses = self._poses.build_mass_matrices(
@@ -216,7 +216,7 @@ class Fitting:
             )
             if not is_positive_definite(masses):
                 shares.append(np.inf)
-        return TermFit(pruning, beta, *errors, cost, strain, float(np.max(shares)), linear)
+        return TermFit(pruning, beta, *errors, cost, total, float(np.max(shares)), linear)
 
     def _compute_ratios(self, errors: tuple[float, float]) -> list[float]:
         """Return the errors over the allowed ones."""
@@ -224,8 +224,8 @@ class Fitting:
         if not self.samples.direct:
             return [torque / self.budget.torque]
         # Of an infinite one no budget is large enough: M is not positive definite.
-        share = np.inf if np.isinf(acceleration) else acceleration / self.budget.acceleration
-        return [torque / self.budget.torque, share]
+        fraction = np.inf if np.isinf(acceleration) else acceleration / self.budget.acceleration
+        return [torque / self.budget.torque, fraction]
 
     def _compute_errors(self, off: FloatArray, inverse: FloatArray | None) -> tuple[float, float]:
         """Return the errors of torques and of accelerations from differences of torques."""
@@ -264,9 +264,11 @@ class Fitting:
         pulls = self._weigh(adjoints, fit.linear.metric).reshape(adjoints.shape)
         itself = fit.pruning.kept[:, WHOLE] & (fit.pruning.source == np.arange(self.tape.size))
         residual = fit.linear.residual.reshape(pulls.shape[1:])
-        ways = find_substitutions(values, pulls, residual, self._made & itself, self._in_parameters)
+        substitutions = find_substitutions(
+            values, pulls, residual, self._made & itself, self._in_parameters
+        )
         constants = self.tape.find_constants()
-        return ways.add_ones(constants[itself[constants]]), values, pulls
+        return substitutions.add_ones(constants[itself[constants]]), values, pulls
 
     def _differentiate(self, fit: TermFit) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return the values of nodes in the pruned program, the values they would have unpruned, and the derivatives of

@@ -84,11 +84,11 @@ def find_substitutions(
     possible &= (linear[nodes][:, None] == linear) & used & (size > 0)
     size[~possible] = 1.0
     costs = np.where(possible, here[:, None] - across**2 / size, np.inf)
-    places = np.argsort(costs, axis=1, kind="stable")[:, :_OTHERS]
+    order = np.argsort(costs, axis=1, kind="stable")[:, :_OTHERS]
     rows = np.arange(len(nodes))[:, None]
-    factors = (across[rows, places] / size[rows, places]).ravel()
-    costs = costs[rows, places].ravel()
-    found = Substitutions(np.repeat(nodes, places.shape[1]), places.ravel(), factors)
+    factors = (across[rows, order] / size[rows, order]).ravel()
+    costs = costs[rows, order].ravel()
+    found = Substitutions(np.repeat(nodes, order.shape[1]), order.ravel(), factors)
     found = found[np.argsort(costs, kind="stable")[: min(_WAYS, int(np.isfinite(costs).sum()))]]
 
     plain = ~linear[nodes]

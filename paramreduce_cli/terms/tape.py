@@ -31,15 +31,15 @@ class Outputs(NamedTuple):
     """The outputs of a program without those that are always zero, as most entries of loops' mass matrices are."""
 
     values: FloatArray
-    """(k, n_samples)"""
-    places: IntArray
-    """Among all outputs, rising, (k,)."""
+    """Values of the outputs, (k, n_samples)."""
+    positions: IntArray
+    """Positions among all outputs, ascending, (k,)."""
 
     @classmethod
     def drop_zero(cls, everything: FloatArray) -> Outputs:
         """Return the outputs, (n_outputs, n_samples), without those that are zero for every sample."""
-        places = np.flatnonzero(everything.any(axis=1))
-        return cls(everything[places], places)
+        positions = np.flatnonzero(everything.any(axis=1))
+        return cls(everything[positions], positions)
 
 
 class Tape:

@@ -100,12 +100,12 @@ class TermSearch:
             beta: Values to start from.
         """
         fit = self._fitting.fit(pruning, beta, checks=2)
-        back: list[int] = []
+        restored: list[int] = []
         while not fit.within:
-            number = self._find_most_helpful(fit, back)
+            number = self._find_most_helpful(fit, restored)
             if number is None:
                 break
-            back.append(number)
+            restored.append(number)
             fit = self._fit_flipped(fit, self._candidates[number][None])
         return self._step(fit)
 
@@ -123,7 +123,7 @@ class TermSearch:
             return several
         lists = [
             np.argsort(cost / saved, kind="stable")[:n_checked]
-            for cost in (costs.again, costs.plain)
+            for cost in (costs.refitted, costs.unfitted)
         ]
         for number in np.unique(np.concatenate(lists)):
             changed = self._fit_flipped(fit, live[number : number + 1])
@@ -169,20 +169,28 @@ class TermSearch:
     def _substitute(self, step: Step, weights: FloatArray) -> Step | None:
         """Return the program with one node replaced by another, or None if all substitutions are too costly."""
         fit = step.fit
-        ways, values, pulls = self._fitting.list_substitutions(fit)
-        counts = self.tape.count_replaced(fit.pruning, ways.nodes, ways.sources, ways.factors)
-        own = weights[self._itself[ways.nodes]]
+        substitutions, values, pulls = self._fitting.list_substitutions(fit)
+        counts = self.tape.count_replaced(
+            fit.pruning, substitutions.nodes, substitutions.sources, substitutions.factors
+        )
+        own = weights[self._itself[substitutions.nodes]]
         useful = np.flatnonzero(counts < step.count)
-        ways, own, saved = ways[useful], own[useful], (step.count - counts[useful]).astype(float)
+        substitutions, own, saved = (
+            substitutions[useful],
+            own[useful],
+            (step.count - counts[useful]).astype(float),
+        )
         none = np.zeros((len(useful), self._fitting.n))
-        costs = fit.linear.estimate_costs(ways.estimate_changes(values, pulls), fit.beta, none)
+        costs = fit.linear.estimate_costs(
+            substitutions.estimate_changes(values, pulls), fit.beta, none
+        )
         lists = [
             np.argsort(cost * own / saved, kind="stable")[:_TRIED]
-            for cost in (costs.again, costs.plain)
+            for cost in (costs.refitted, costs.unfitted)
         ]
         tried = []
         for place in np.unique(np.concatenate(lists)):
-            changed = self._fitting.fit(fit.pruning.replace(*ways.get(place)), fit.beta)
+            changed = self._fitting.fit(fit.pruning.replace(*substitutions.get(place)), fit.beta)
             if changed.within:
                 tried.append(((changed.total_cost - fit.total_cost) / saved[place], place, changed))
         return self._step(min(tried, key=lambda entry: entry[:2])[2]) if tried else None
@@ -211,9 +219,9 @@ class TermSearch:
 
     def _find_most_helpful(self, fit: TermFit, but: list[int]) -> int | None:
         """Return the number of the term whose return helps most for its operations, or None if none helps."""
-        gone = ~fit.pruning.has(self._candidates)
-        gone[but] = False
-        numbers = np.flatnonzero(gone)
+        removed = ~fit.pruning.has(self._candidates)
+        removed[but] = False
+        numbers = np.flatnonzero(removed)
         if not numbers.size:
             return None
         terms = self._candidates[numbers]

@@ -38,8 +38,8 @@ def test_torques_and_mass_matrices_of_outputs_most_of_which_are_zero(direct, wit
     everything = rng.normal(size=((N * (N + 1) // 2 if direct else 0) + N, COUNT))
     everything[rng.random(len(everything)) < share] = 0.0
     outputs = Outputs.drop_zero(everything)
-    assert (len(outputs.places) > 0) == (share < 1)
-    assert len(outputs.places) < len(everything)
+    assert (len(outputs.positions) > 0) == (share < 1)
+    assert len(outputs.positions) < len(everything)
 
     torques = everything[-N:].copy()
     if direct:

@@ -205,5 +205,5 @@ def test_outputs_are_those_that_are_not_zero(inputs):
     )
     pruning = tape.keep_all()
     found = tape.get_outputs(tape.evaluate(pruning, inputs, tape.mark_live(pruning)))
-    assert found.places.tolist() == [1]
+    assert found.positions.tolist() == [1]
     np.testing.assert_allclose(found.values, -inputs[:1] * inputs[2:3])

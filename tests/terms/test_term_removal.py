@@ -133,10 +133,12 @@ def test_costs_of_combinations_of_parameters_are_exact(arm):
         for k in known:
             # Numbers of one sum that cancel are lost in the square of their size.
             cost = fitting.fit(fit.pruning.flip(live[k][None]), fit.beta).cost - fit.cost
-            assert costs.again[k] == pytest.approx(cost, rel=1e-6, abs=1e-8 * costs.plain.max())
-            assert costs.sure[k] == costs.again[k]
+            assert costs.refitted[k] == pytest.approx(
+                cost, rel=1e-6, abs=1e-8 * costs.unfitted.max()
+            )
+            assert costs.sure[k] == costs.refitted[k]
         others = np.setdiff1d(np.arange(len(live)), known)
-        assert np.all(costs.again[others] <= costs.plain[others])
+        assert np.all(costs.refitted[others] <= costs.unfitted[others])
 
 
 @pytest.mark.parametrize("direct", [False, True])

@@ -81,8 +81,8 @@ def _check_extra(extra: str, names: tuple[str, ...]) -> tuple[str, str, str]:
     words = [sys.executable, "-c", f"import {', '.join(names)}"]
     done = subprocess.run(words, capture_output=True, text=True, check=False)
     if done.returncode:
-        said = done.stderr.strip().rpartition("\n")[2] or f"exit code {done.returncode}"
-        return f"extra {extra}", "wrong", f"{', '.join(names)} cannot be imported: {said}"
+        message = done.stderr.strip().rpartition("\n")[2] or f"exit code {done.returncode}"
+        return f"extra {extra}", "wrong", f"{', '.join(names)} cannot be imported: {message}"
     listed = (f"{name} {version}" for name, version in zip(names, versions, strict=True))
     return f"extra {extra}", "ok", ", ".join(listed)
 
@@ -107,10 +107,10 @@ def _check_compiler() -> tuple[str, str, str]:
         if not made.exists():
             text = f"{' '.join(command)} compiles nothing; models run several times slower"
             return "C compiler", "slow", text
-    said = subprocess.run(
+    output = subprocess.run(
         [*command, "--version"], capture_output=True, text=True, check=False, timeout=20
     )
-    return "C compiler", "ok", f"{' '.join(command)}: {said.stdout.partition(chr(10))[0]}"
+    return "C compiler", "ok", f"{' '.join(command)}: {output.stdout.partition(chr(10))[0]}"
 
 
 def _check_caches() -> Iterator[tuple[str, str, str]]:
@@ -132,15 +132,15 @@ def _check_model_cache() -> tuple[str, str, str]:
     from paramreduce_cli.expressions.compiled import load
 
     what = "cache of compiled models"
-    with warnings.catch_warnings(record=True) as said:
+    with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         try:
             folder = find_cache_folder()
             load("int paramreduce_doctor(void) { return 1; }\n")
         except (ParamreduceError, OSError) as error:
             return what, "wrong", str(error)
-    if said:
-        return what, "slow", str(said[-1].message)
+    if caught:
+        return what, "slow", str(caught[-1].message)
     files = list(folder.glob("*.so"))
     size = sum(file.stat().st_size for file in files) / 1e6
     free = shutil.disk_usage(folder).free / 1e9

@@ -150,7 +150,7 @@ def export(
             loaded, loading[Model], _find_standard(loading, text, chosen), kind
         )
     else:
-        with show_progress("export") as tell:
+        with show_progress("export") as progress:
             checked = make_exported_model(
                 loading[Model],
                 chosen,
@@ -161,7 +161,7 @@ def export(
                 simplified=simplified,
                 origin=origin,
                 validation=loading.get(Validation),
-                report_progress=tell,
+                report_progress=progress,
             )
         files = languages[kind](checked)
     save_files(folder, files)

@@ -70,12 +70,12 @@ def export_trajectory(
     model, trajectories = (load_current(loaded, store, record) for record in (Model, Trajectories))
     pose = loaded.trajectories.start_pose
     start = None if pose is None else expand_per_joint(pose, loaded.n_dof)
-    ways = PathPlanner(model, trajectories)
+    planner = PathPlanner(model, trajectories)
 
     def timed(which: str) -> TimedMotion:
         chosen, title = _find_chosen(trajectories, which), f"{loaded.robot} {which}"
         return sample_motion(
-            model.mechanism, trajectories, chosen, rate=rate, title=title, start_pose=start, planner=ways
+            model.mechanism, trajectories, chosen, rate=rate, title=title, start_pose=start, planner=planner
         )  # fmt: skip
 
     which, motion = (which, timed(which)) if which else _find_first(trajectories, timed)

@@ -186,13 +186,13 @@ def _say_summary(summary: dict[str, Any]) -> None:
         say("Errors: on the estimation and on the validation set.")
     say("Ops: operations of the inverse dynamics, and of mass matrix and bias (direct dynamics).")
     for one in summary["terms"]:
-        said = "".join(
+        texts = "".join(
             f", {what} error {known}"
             for what in ("torque", "acceleration")
             if (known := _format_errors(one[f"{what}_error"]))
         )
         say(
-            f"Negligible terms removed, {one['function']} dynamics: {one['operations']} operations{said}"
+            f"Negligible terms removed, {one['function']} dynamics: {one['operations']} operations{texts}"
         )
     if found is not None:
         say(found["comparison"])

@@ -19,12 +19,12 @@ def _divide_by_largest(
     W: FloatArray, axis: int, norm: float
 ) -> tuple[FloatArray, Callable[[FloatArray], FloatArray]]:
     """Return W divided by its largest magnitudes along an axis, and the pullback of derivatives."""
-    size, share = _compute_largest(W, axis, norm)
+    size, fraction = _compute_largest(W, axis, norm)
     scaled = W / size
 
     def pull(bar: FloatArray) -> FloatArray:
         lost = np.sum(bar * scaled, axis=axis, keepdims=True)
-        result: FloatArray = (bar - lost * share) / size
+        result: FloatArray = (bar - lost * fraction) / size
         return result
 
     return scaled, pull
@@ -40,9 +40,9 @@ def _compute_largest(W: FloatArray, axis: int, norm: float) -> tuple[FloatArray,
     largest = np.where(largest > 0, largest, 1.0)
     if np.isinf(norm):
         where = np.expand_dims(np.argmax(magnitude, axis=axis), axis)
-        share = np.zeros_like(W)
-        np.put_along_axis(share, where, np.sign(np.take_along_axis(W, where, axis)), axis)
-        return largest, share
+        fraction = np.zeros_like(W)
+        np.put_along_axis(fraction, where, np.sign(np.take_along_axis(W, where, axis)), axis)
+        return largest, fraction
     ratio = W / largest
     power, odd = ratio * ratio, ratio.copy()
     doublings = max(1, round(np.log2(norm)))

@@ -202,11 +202,11 @@ class _Writer:
             before.append(f"{self._real} angles[{count}] = {{{angles}}};")
             before.append(f"{self._real} sine[{count}], cosine[{count}];")
             before.append(f"sines({count}, angles, sine, cosine);")
-        places = zip(
+        positions = zip(
             function.list_positions(function.results), function.program.outputs, strict=True
         )
         outputs = [
-            f"{array.name}[{k}] = {write_signed(names, value)};" for (array, k), value in places
+            f"{array.name}[{k}] = {write_signed(names, value)};" for (array, k), value in positions
         ]
         return [*before, *rest, *outputs]
 
@@ -248,25 +248,25 @@ class _Writer:
             text = f"const {self._real} t{number} = {language.write_expression(names, node)};"
             names[number] = f"t{number}"
             (rest if found.states[number] else once).append(text)
-        again = language.write_leaves(function)
+        angle_names = language.write_leaves(function)
         for number, node in function.iterate_steps():
             if number in found.before:
-                text = f"const {self._real} a{number} = {language.write_expression(again, node)};"
-                again[number] = f"a{number}"
+                text = f"const {self._real} a{number} = {language.write_expression(angle_names, node)};"
+                angle_names[number] = f"a{number}"
                 before.append(text)
-        filled = [(row, again[angle]) for angle, row in rows.items()]
+        filled = [(row, angle_names[angle]) for angle, row in rows.items()]
         outputs = list(dict.fromkeys(program.outputs))
         rest += [
             f"out[{row}][k] = {write_signed(names, value)};" for row, value in enumerate(outputs)
         ]
-        places = zip(function.list_positions(function.results), program.outputs, strict=True)
+        positions = zip(function.list_positions(function.results), program.outputs, strict=True)
         return {
             "once": once,
             "before": before,
             "angles": filled,
             "rest": rest,
             "outputs": outputs,
-            "copies": [(outputs.index(value), array.name, k) for (array, k), value in places],
+            "copies": [(outputs.index(value), array.name, k) for (array, k), value in positions],
         }
 
     def estimate_stack(self) -> int:

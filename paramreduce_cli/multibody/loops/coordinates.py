@@ -148,8 +148,8 @@ class Coordinates:
         for k, leader in enumerate(leaders):
             q, reached = self.follow(z[leader : leader + 1], start)
             if reached[0] < 1:
-                share = np.where(np.arange(z.shape[0]) < leader, 1.0, reached[0])
-                return np.empty((z.shape[0], self.mechanism.n_q)), share
+                fraction = np.where(np.arange(z.shape[0]) < leader, 1.0, reached[0])
+                return np.empty((z.shape[0], self.mechanism.n_q)), fraction
             known[k] = start = q[0]
         return self.follow(z, known[np.arange(z.shape[0]) // _LEADERS])
 
@@ -167,12 +167,12 @@ class Coordinates:
         assert self.mechanism.loops is not None
         begin = self.mechanism.loops.assembly if start is None else start
         q = np.array(np.broadcast_to(begin, (z.shape[0], self.mechanism.n_q)))
-        way = z - q[:, self._independent]
+        displacement = z - q[:, self._independent]
         made, step = np.zeros(z.shape[0]), np.ones(z.shape[0])
         active = np.arange(z.shape[0])
         while active.size:
             length = np.minimum(step[active], 1 - made[active])
-            new, good = self._advance(q[active], way[active] * length[:, None])
+            new, good = self._advance(q[active], displacement[active] * length[:, None])
             moved = active[good]
             q[moved] = new[good]
             made[moved] += length[good]

@@ -75,7 +75,7 @@ class Data(NamedTuple):
     """First column of each group, whose columns stand together, (n_groups,)."""
     size: IntArray
     """Columns of each group, (n_groups,)."""
-    places: int
+    slots: int
     """Columns that may be included."""
     factor: float
     """Share of the best squared error that a subset must be below."""
@@ -170,10 +170,10 @@ def _sweep(tableau: FloatArray, start: int, row: int, j: int, column_errors: Flo
 @_within
 def _compute_null_fraction(tableau: FloatArray, nullity: int, j: int) -> float:
     """Return the squared share of a column in the null space of all included and free columns."""
-    start, share = 2 * tableau.shape[1], 0.0
+    start, fraction = 2 * tableau.shape[1], 0.0
     for c in range(nullity):
-        share += tableau[start + c, j] * tableau[start + c, j]
-    return share
+        fraction += tableau[start + c, j] * tableau[start + c, j]
+    return fraction
 
 
 @inline
@@ -182,15 +182,15 @@ def _exclude(
 ) -> None:
     """Exclude a free column, and raise the bound by what the exclusion costs."""
     n, row = tableau.shape[1], tableau.shape[0] - 1
-    share = _compute_null_fraction(tableau, counters[NULLITY], j)
+    fraction = _compute_null_fraction(tableau, counters[NULLITY], j)
     # Round-off may leave nothing of what an exclusion costs where columns are nearly dependent.
-    known = share > APART or tableau[n + j, j] > 0
-    if counters[NEAR] == 1 or APART < share < INVOLVED or not known:
+    known = fraction > APART or tableau[n + j, j] > 0
+    if counters[NEAR] == 1 or APART < fraction < INVOLVED or not known:
         _drop(tableau, counters, j)
         _refit(tableau, counters, errors, s, data)
         return
-    if share > APART:
-        _exclude_dependent(tableau, counters, j, share)
+    if fraction > APART:
+        _exclude_dependent(tableau, counters, j, fraction)
     else:
         errors[BOUND] += tableau[row, j] ** 2 / tableau[n + j, j]
         _sweep(tableau, n, row, j, s.spare[: counters[FREE]])
@@ -354,22 +354,22 @@ def _decide(
 def _branch(s: State, data: Data, group: int) -> None:
     """Keep the node for later, and continue with a copy that includes a group."""
     level = s.progress[LEVEL]
-    sheet, numbers = s.sheets[level], s.numbers[level]
-    numbers[BRANCH], numbers[MARK] = group, s.progress[LOGGED]
+    tableau, counters = s.sheets[level], s.numbers[level]
+    counters[BRANCH], counters[MARK] = group, s.progress[LOGGED]
     s.log[s.progress[LOGGED]] = 0
     s.progress[LOGGED] += 1
     s.progress[LEVEL] = level + 1
     deeper = s.sheets[level + 1]
-    n, free = sheet.shape[1], numbers[FREE]
+    n, free = tableau.shape[1], counters[FREE]
     for start in (0, n):
         for i in range(free):
             for k in range(free):
-                deeper[start + i, k] = sheet[start + i, k]
-    for row in range(2 * n, sheet.shape[0]):
+                deeper[start + i, k] = tableau[start + i, k]
+    for row in range(2 * n, tableau.shape[0]):
         for k in range(free):
-            deeper[row, k] = sheet[row, k]
+            deeper[row, k] = tableau[row, k]
     for k in range(FIRST + free):
-        s.numbers[level + 1, k] = numbers[k]
+        s.numbers[level + 1, k] = counters[k]
     s.errors[level + 1, INSIDE] = s.errors[level, INSIDE]
     s.errors[level + 1, BOUND] = s.errors[level, BOUND]
     _decide(deeper, s.numbers[level + 1], s.errors[level + 1], s, data, group, _INCLUDE)
@@ -414,19 +414,19 @@ def _backtrack(s: State, data: Data) -> None:
     level = s.progress[LEVEL]
     if level < 0:
         return
-    sheet, numbers, errors = s.sheets[level], s.numbers[level], s.errors[level]
-    s.progress[LOGGED] = numbers[MARK]
-    group = numbers[BRANCH]
+    tableau, counters, errors = s.sheets[level], s.numbers[level], s.errors[level]
+    s.progress[LOGGED] = counters[MARK]
+    group = counters[BRANCH]
     if data.size[group] == 1:
-        _exclude_parallel(sheet, numbers, errors, s, data, group)
-    _decide(sheet, numbers, errors, s, data, group, _EXCLUDE)
+        _exclude_parallel(tableau, counters, errors, s, data, group)
+    _decide(tableau, counters, errors, s, data, group, _EXCLUDE)
 
 
 @_within
 def _compute_threshold(best: float, factor: float, uncertainty: float) -> float:
     """Return the squared error above which a node is cut off."""
-    wanted: float = best * factor
-    return wanted + 2 * np.sqrt(wanted) * uncertainty
+    target: float = best * factor
+    return target + 2 * np.sqrt(target) * uncertainty
 
 
 @_making_arrays
@@ -471,16 +471,16 @@ def _reduce_node(
         if errors[INSIDE] < threshold + data.slack:
             _offer(s, data, counters[INCLUDED], _NO_COLUMN, _NO_COLUMN)
             threshold = _compute_threshold(s.best[0], data.factor, data.uncertainty)
-        places = data.places - counters[INCLUDED]
-        if errors[BOUND] >= threshold or places == 0 or counters[FREE] == 0:
+        slots = data.slots - counters[INCLUDED]
+        if errors[BOUND] >= threshold or slots == 0 or counters[FREE] == 0:
             return False
         room = threshold - errors[BOUND]
         needed, must, useless = _count_mandatory(
-            tableau, counters, data.group, data.size, places, room
+            tableau, counters, data.group, data.size, slots, room
         )
         if useless >= 0:
             _decide(tableau, counters, errors, s, data, useless, _EXCLUDE)
-        elif needed > places:
+        elif needed > slots:
             return False
         elif must < 0:
             return True
@@ -643,16 +643,16 @@ def search(s: State, data: Data, log: IntArray, most: int) -> tuple[int, int]:
         if nodes == most:
             return PAUSED, nodes
         nodes += 1
-        sheet, numbers, errors = s.sheets[level], s.numbers[level], s.errors[level]
-        open_ = _reduce_node(sheet, numbers, errors, s, data)
-        places = data.places - numbers[INCLUDED]
-        if open_ and places == 1:
-            _fill_last_place(sheet, numbers, errors[INSIDE], s, data)
+        tableau, counters, errors = s.sheets[level], s.numbers[level], s.errors[level]
+        open_ = _reduce_node(tableau, counters, errors, s, data)
+        slots = data.slots - counters[INCLUDED]
+        if open_ and slots == 1:
+            _fill_last_place(tableau, counters, errors[INSIDE], s, data)
             open_ = False
-        elif open_ and places == 2 and singles:
-            _fill_last_two_places(sheet, numbers, errors[INSIDE], s, data)
+        elif open_ and slots == 2 and singles:
+            _fill_last_two_places(tableau, counters, errors[INSIDE], s, data)
             open_ = False
         if open_:
-            _branch(s, data, data.group[_choose_branching_column(sheet, numbers)])
+            _branch(s, data, data.group[_choose_branching_column(tableau, counters)])
         else:
             s.progress[GOING_BACK] = 1

@@ -158,10 +158,10 @@ class ProofSearch:
 
     def _compile(self) -> None:
         """Compile the search, and say so where that has not been done on this machine before."""
-        said = threading.Event()
+        announced = threading.Event()
 
         def tell(done: int) -> None:
-            said.set()
+            announced.set()
             what = "compile the search for best subsets, once for all runs"
             self._task.progress(Progress(what, done, 1))
 
@@ -169,7 +169,7 @@ class ProofSearch:
         late.start()
         compile_search()
         late.cancel()
-        if said.is_set():
+        if announced.is_set():
             tell(1)
 
     def _list_open(self) -> list[_Proof]:
@@ -236,9 +236,9 @@ class ProofSearch:
     def _share_incumbents(self, proof: _Proof, search: PartedSearch) -> None:
         """Tell other jobs of a better subset, or hear of one; what is heard is calculated anew."""
         key = f"incumbent-{proof.n:04d}"
-        told = self._task.incumbents.get(key, proof.subset[:0])
-        usable = 0 < told.size <= proof.n and set(told.tolist()) <= self._place.keys()
-        subset = self._number_columns(told) if usable else proof.subset
+        incumbent = self._task.incumbents.get(key, proof.subset[:0])
+        usable = 0 < incumbent.size <= proof.n and set(incumbent.tolist()) <= self._place.keys()
+        subset = self._number_columns(incumbent) if usable else proof.subset
         known = self._compute_squared_error(subset) if usable else proof.squared_error
         if known < search.squared_error * (1 - RESOLUTION):
             search.take_incumbent(known, subset)
@@ -272,8 +272,8 @@ class ProofSearch:
 
         def work(proof: _Proof) -> None:
             known = np.sqrt(proof.squared_bound / proof.squared_error)
-            for share in (share for share in _SHARES if share > known):
-                search = self._start_search(proof, factor=share**2)
+            for fraction in (fraction for fraction in _SHARES if fraction > known):
+                search = self._start_search(proof, factor=fraction**2)
                 for nodes in self._iterate_slices(proof, search, _NODES_PER_SHARE, deadline, stop):
                     search.advance(nodes, threads=1)
                 if not search.finished or not self._is_certain(search):

@@ -119,7 +119,7 @@ class Search:
             group=problem.group.astype(np.int64),
             first=np.searchsorted(problem.group, np.arange(problem.group[-1] + 1)),
             size=np.bincount(problem.group).astype(np.int64),
-            places=size,
+            slots=size,
             factor=factor * (1 - RESOLUTION),
             uncertainty=_UPDATES * problem.condition,
             slack=_SLACK,
@@ -186,8 +186,8 @@ class Search:
 
     def _continue_from(self, log: IntArray) -> Search:
         """Return a search that continues from a log of nodes."""
-        places = self._data.places
-        return Search(self._problem, places, self.squared_error, self.subset, self._factor, log)
+        slots = self._data.slots
+        return Search(self._problem, slots, self.squared_error, self.subset, self._factor, log)
 
     def take_incumbent(self, squared_error: float, subset: IntArray) -> None:
         """Take over a better subset that another search of the same size has found."""
@@ -231,14 +231,14 @@ class Search:
     def _bound_exclusion(self, level: int) -> float:
         """Return the bound of the branch that a level has still to take."""
         kernel, state = self._kernel, self._state
-        sheet, numbers = state.sheets[level], state.numbers[level]
-        n, nullity = sheet.shape[1], int(numbers[kernel.NULLITY])
-        free = numbers[kernel.FIRST : kernel.FIRST + numbers[kernel.FREE]]
-        own = np.flatnonzero(self._data.group[free] == numbers[kernel.BRANCH])
-        if numbers[kernel.NEAR]:
+        tableau, counters = state.sheets[level], state.numbers[level]
+        n, nullity = tableau.shape[1], int(counters[kernel.NULLITY])
+        free = counters[kernel.FIRST : kernel.FIRST + counters[kernel.FREE]]
+        own = np.flatnonzero(self._data.group[free] == counters[kernel.BRANCH])
+        if counters[kernel.NEAR]:
             return float(state.errors[level, kernel.BOUND])
-        apart = np.sum(sheet[2 * n : 2 * n + nullity, own] ** 2, axis=0) <= kernel.APART
-        rises = np.where(apart, sheet[-1, own] ** 2 / sheet[n + own, own], 0.0)
+        apart = np.sum(tableau[2 * n : 2 * n + nullity, own] ** 2, axis=0) <= kernel.APART
+        rises = np.where(apart, tableau[-1, own] ** 2 / tableau[n + own, own], 0.0)
         return float(state.errors[level, kernel.BOUND] + rises.max())
 
     @property

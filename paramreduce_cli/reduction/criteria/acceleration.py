@@ -99,12 +99,12 @@ class _Accelerations:
         for _ in range(_STEPS if best is not None else 0):
             assert best is not None
             step = _solve_least_squares(self.compute_slope(best, columns), best.residual.ravel())
-            share, found = 1.0, None
-            while share > _SMALLEST_STEP:
-                found = self.evaluate(columns, best.parameters + share * step)
+            step_size, found = 1.0, None
+            while step_size > _SMALLEST_STEP:
+                found = self.evaluate(columns, best.parameters + step_size * step)
                 if found is not None and found.error < best.error:
                     break
-                share, found = share / 2, None
+                step_size, found = step_size / 2, None
             if found is None:
                 break
             settled = found.error > best.error * (1 - _SETTLED)

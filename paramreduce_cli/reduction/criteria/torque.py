@@ -112,10 +112,10 @@ class TorqueObjective(Objective):
         if improvement is None:
             return [exchange for exchange in self._try_one_by_one(kept) if exchange[2] <= limit]
         errors = np.sqrt(np.maximum(self.score(kept) ** 2 - improvement, 0.0))
-        places, groups = np.nonzero(errors <= limit)
+        indices, groups = np.nonzero(errors <= limit)
         return [
             (kept[place], int(group), float(errors[place, group]))
-            for place, group in zip(places, groups, strict=True)
+            for place, group in zip(indices, groups, strict=True)
         ]
 
     def _compute_improvements(self, kept: Subset) -> FloatArray | None:
@@ -158,10 +158,10 @@ class TorqueObjective(Objective):
 
     def _project_out(self, kept: Subset) -> Orthogonaliser:
         """Return what a subset leaves of all columns; quick if the subset extends the last one."""
-        taken, rest = self._taken
-        if kept[: len(taken)] != taken:
-            taken, rest = (), self._start_orthogonaliser()
-        for group in kept[len(taken) :]:
+        projected, rest = self._taken
+        if kept[: len(projected)] != projected:
+            projected, rest = (), self._start_orthogonaliser()
+        for group in kept[len(projected) :]:
             for column in [group] if self.single else np.flatnonzero(self.owner == group).tolist():
                 rest.take(column)
         self._taken = (kept, rest)

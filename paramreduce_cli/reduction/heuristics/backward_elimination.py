@@ -15,6 +15,6 @@ def backward_elimination(task: SelectionTask) -> FoundSubsets:
     order: Subset = ()
     while left:
         fewer = task.objective.remove_worst(left)
-        (gone,) = set(left) - set(fewer)
-        left, order = remove_group(left, gone), (gone, *order)
+        (removed,) = set(left) - set(fewer)
+        left, order = remove_group(left, removed), (removed, *order)
     return make_nested(task, order)

@@ -23,14 +23,14 @@ def identified_parameters(data: ReportData) -> Figure | None:
     order = np.argsort(relative)
     drawn = make_figure(0.8)
     axes = drawn.subplots()
-    places = np.arange(order.size)
+    positions = np.arange(order.size)
     axes.errorbar(
-        places, np.ones(order.size), np.minimum(relative[order], 10), fmt="o", color="#0b62c4",
+        positions, np.ones(order.size), np.minimum(relative[order], 10), fmt="o", color="#0b62c4",
         markersize=4, capsize=3, linewidth=1.1,
     )  # fmt: skip
     axes.axhline(0, color="#8a929c", linewidth=0.8)
     widest = min(3.0, float(relative.max(initial=0.1)) * 1.15)
     axes.set_ylim(1 - max(widest, 0.2), 1 + max(widest, 0.2))
-    axes.set_xticks(places, [found.names[k] for k in order], rotation=90, fontsize="x-small")
+    axes.set_xticks(positions, [found.names[k] for k in order], rotation=90, fontsize="x-small")
     axes.set_ylabel("value / own value")
     return drawn

@@ -22,11 +22,11 @@ def stability(data: ReportData) -> Figure:
     often = found.chosen.mean(axis=0)
     order = np.argsort(-often, kind="stable")[: int(np.sum(often > 0))]
     upper, middle, lower = drawn.subplots(3, 1)
-    places = np.arange(order.size)
+    positions = np.arange(order.size)
     own = np.isin(order, np.flatnonzero(found.chosen[0]))
-    upper.bar(places, 100 * often[order], color=np.where(own, "#0b62c4", "#b9c2cc"), width=0.7)
+    upper.bar(positions, 100 * often[order], color=np.where(own, "#0b62c4", "#b9c2cc"), width=0.7)
     upper.set_ylabel("chosen, %")
-    for place, column in zip(places, order, strict=True):
+    for place, column in zip(positions, order, strict=True):
         values = found.values[found.chosen[:, column], column]
         scale = np.abs(np.median(values)) or 1.0
         middle.plot([place, place], 100 * (np.array([values.min(), values.max()]) / scale
@@ -37,7 +37,7 @@ def stability(data: ReportData) -> Figure:
     for axes, shown in ((upper, False), (middle, True)):
         labels = [names[k] for k in order] if shown else []
         axes.set_xticks(
-            places, labels if shown else [""] * order.size, rotation=90, fontsize="x-small"
+            positions, labels if shown else [""] * order.size, rotation=90, fontsize="x-small"
         )
         axes.set_xlim(-0.7, order.size - 0.3)
         axes.grid(axis="x", visible=False)

@@ -39,11 +39,11 @@ def tracking(data: ReportData) -> Figure | None:
     for axes, (name, errors) in zip(below, result.errors.items(), strict=True):
         rms = 1e3 * result.compute_rms(name)
         axes.set_ylabel("off, mrad or mm")
-        told = (
+        caption = (
             f"{name}: {np.median(rms):.2g} mrad rms ({rms.min():.2g} to {rms.max():.2g} over {rms.size} "
             f"paths), at most {1e3 * float(np.abs(errors).max()):.2g}; "
             f"{1e9 * speed.seconds[name]:.3g} ns a step in {speed.language}"
         )
-        axes.set_title(break_lines(told), fontsize="small", loc="left")
+        axes.set_title(break_lines(caption), fontsize="small", loc="left")
     below[-1].set_xlabel("time, s")
     return drawn

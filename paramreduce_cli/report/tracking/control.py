@@ -36,8 +36,8 @@ def simulate(paths: Paths, model: Torque, arm: Arm, bandwidth: float) -> FloatAr
     errors = np.empty_like(paths.z)
     for k in range(paths.time.size):
         errors[k] = paths.z[k] - z
-        wanted = paths.ddz[k] + 2 * bandwidth * (paths.dz[k] - dz) + bandwidth**2 * errors[k]
-        z, dz = arm(z, dz, model(z, dz, wanted))
+        demanded = paths.ddz[k] + 2 * bandwidth * (paths.dz[k] - dz) + bandwidth**2 * errors[k]
+        z, dz = arm(z, dz, model(z, dz, demanded))
     return errors
 
 

@@ -21,8 +21,8 @@ def essential(task: SelectionTask) -> FoundSubsets:
     tail = append_others(objective, left)[len(left) :]
     while left:
         unsure = _compute_relative_deviations(objective, left)
-        gone = left[len(left) - 1 - int(np.argmax(unsure[::-1]))]  # ties: the least preferred
-        left, tail = remove_group(left, gone), (gone, *tail)
+        removed = left[len(left) - 1 - int(np.argmax(unsure[::-1]))]  # ties: the least preferred
+        left, tail = remove_group(left, removed), (removed, *tail)
     return make_nested(task, tail)
 
 
