@@ -26,7 +26,7 @@ from paramreduce_cli.records import FloatArray
 
 @dataclass(frozen=True)
 class Level:
-    """One step of the continuation from a blunt to a sharp objective."""
+    """A step of the continuation from a smooth to a sharp objective."""
 
     sharpness: float
     """Exponent of the smooth condition number."""
@@ -40,7 +40,7 @@ class Level:
 
 @dataclass(frozen=True)
 class Bound:
-    """The bound that a motion is nearest to, or misses by most."""
+    """The bound that a motion is nearest to, or exceeds by most."""
 
     excess: float
     """Distance of the worst value beyond the bound, as a fraction of the bound's size; negative inside."""
@@ -84,7 +84,7 @@ class Excitation:
 
         Args:
             q: Generalised coordinates along a motion, (n_points, n_q).
-            dz: Velocities of the independent ones, (n_points, n_dof).
+            dz: Velocities of the independent coordinates, (n_points, n_dof).
             ddz: Accelerations, same shape.
         """
         W = self.measured(q, dz, ddz) * self._row_weights(q.shape[0])
@@ -96,7 +96,9 @@ class Excitation:
     def evaluate(
         self, basis: FourierBasis, coefficients: FloatArray, level: Level, positions: Follower
     ) -> tuple[float, FloatArray]:
-        """Return the criterion and its derivative by the coefficients, (n_dof, 1 + 2 harmonics).
+        """Return the criterion and its derivative with respect to the coefficients, (n_dof, 1 + 2 harmonics).
+
+        A barrier is added if torque or power are limited; the value is infinite beyond these limits.
 
         With a barrier where torque or power are limited; infinite beyond the limits.
         """
@@ -131,7 +133,8 @@ class Excitation:
     def evaluate_barrier(
         self, basis: FourierBasis, coefficients: FloatArray, level: Level, positions: Follower
     ) -> tuple[float, FloatArray]:
-        """Return the logarithmic barrier of the bounds and its derivative by the coefficients.
+        """Return the logarithmic barrier of the bounds, infinite outside them, and its derivative with respect to the
+        coefficients.
 
         Each bound's row is replaced by its smooth maximum over time, which is never below the
         true one. Infinite outside the bounds.
@@ -146,7 +149,7 @@ class Excitation:
         return value, z_bar.T @ basis.position
 
     def compute_load_ratio(self, q: FloatArray, dz: FloatArray, ddz: FloatArray) -> float:
-        """Return the largest share of a torque or power limit that a motion uses, zero without limits."""
+        """Return the largest fraction of a torque or power limit that a motion uses, zero without limits."""
         if not self.loads.limited:
             return 0.0
         W = self.measured(q, dz, ddz) * self._row_weights(q.shape[0])
@@ -160,7 +163,9 @@ class Excitation:
         return peaks
 
     def find_worst_bound(self, z: FloatArray, positions: Follower) -> Bound:
-        """Return the bound that positions z, (n_samples, n_dof), miss by most; infinite where loops cannot be closed."""
+        """Return the bound that positions z, (n_samples, n_dof), exceed by most; its excess is infinite if loops cannot
+        be closed.
+        """
         try:
             rows = self.quantities.compute_rows(positions(z))
         except DataError as error:
@@ -179,7 +184,8 @@ class Excitation:
 
 
 def _evaluate_log_barrier(rows: FloatArray, level: Level) -> tuple[float, FloatArray]:
-    """Return the logarithmic barrier of the smooth maximum over time of each row, and its derivative by the rows.
+    """Return the logarithmic barrier of the smooth maximum over time of each row, and its derivative with respect to
+    the rows. It is infinite if an entry of the rows, (n_points, n_rows), is above zero.
 
     It is infinite if an entry of the rows, (n_points, n_rows), is above zero.
     """
@@ -194,7 +200,7 @@ def _evaluate_log_barrier(rows: FloatArray, level: Level) -> tuple[float, FloatA
 
 @dataclass(frozen=True)
 class FreeObjective:
-    """The criterion over free series, with a barrier at their bounds, for a solver."""
+    """The criterion as a function of free series, with a barrier at the bounds, for IPOPT."""
 
     excitation: Excitation
     basis: FourierBasis
@@ -227,7 +233,7 @@ class FreeObjective:
         return np.nan, np.full(x.size, np.nan)
 
     def find_worst_bound(self, x: FloatArray) -> Bound:
-        """Return the bound that the series at ``x`` misses by most, or is nearest to."""
+        """Return the bound that the series at ``x`` exceeds by most, or is nearest to."""
         coefficients, _ = self._map_to_admissible(x)
         return self.excitation.find_worst_bound(
             self.basis.evaluate(coefficients)[0], self.positions
@@ -236,7 +242,7 @@ class FreeObjective:
     def _map_to_admissible(
         self, x: FloatArray
     ) -> tuple[FloatArray, Callable[[FloatArray], FloatArray]]:
-        """Return admissible coefficients for free variables, and the pullback of derivatives."""
+        """Return admissible coefficients for free variables, and the function that maps derivatives back."""
         free = self.mixing @ x.reshape(self.limits.n_dof, self.limits.n_columns)
         coefficients, pull = self.limits.map_to_admissible(free, self.level.limits)
         return coefficients, lambda bar: (self.mixing.T @ pull(bar)).ravel()

@@ -29,8 +29,8 @@ def find_resting_position(
     margin: float = 1.0,
     preferred: FloatArray | None = None,
 ) -> FloatArray:
-    """Return independent coordinates inside all limits and bounds, (n_dof,): the middle of the limits, or the assembly,
-    or what a search from there finds.
+    """Return independent coordinates inside all limits and bounds, (n_dof,): the middle of the limits, else the
+    assembly, else the result of a search.
 
     Args:
         excitation: Excitation with the bounds.

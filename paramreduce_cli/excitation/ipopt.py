@@ -45,7 +45,7 @@ TIGHT = {"acceptable_tol": 1e-3, "acceptable_iter": 15, "acceptable_obj_change_t
 
 @dataclass(frozen=True)
 class Minimum:
-    """A minimum with the way it was reached."""
+    """A minimum, the number of iterations, and the quasi-Newton matrix at the end."""
 
     x: FloatArray
     value: float
@@ -56,7 +56,7 @@ class Minimum:
 
 
 class _Memory:
-    """The objective with its last point, and the quasi-Newton matrix that grows along the way."""
+    """An objective that stores its last point, and the quasi-Newton matrix built from its gradients."""
 
     def __init__(self, objective: Objective, curvature: FloatArray | None) -> None:
         self._objective = objective
@@ -69,7 +69,7 @@ class _Memory:
         self.best_x: FloatArray | None = None
 
     def evaluate(self, x: FloatArray) -> tuple[float, FloatArray]:
-        """Return value and gradient, which are kept for the last point."""
+        """Return value and gradient; those of the last point are stored."""
         if self._x is None or not np.array_equal(x, self._x):
             self._value, self._gradient = self._objective(x)
             self._x = x.copy()
@@ -153,12 +153,12 @@ def minimise(
     curvature: FloatArray | None = None,
     stopping: Mapping[str, float] = LOOSE,
 ) -> Minimum:
-    """Minimise a smooth function.
+    """Minimise a smooth function with IPOPT.
 
     Args:
-        objective: Value and gradient at a point.
-        start: (n,)
-        max_iterations: Most iterations of IPOPT.
+        objective: Function that returns value and gradient at a point.
+        start: Point to start from, (n,).
+        max_iterations: Largest number of iterations.
         curvature: Quasi-Newton matrix to start with, (n, n).
         stopping: Options of IPOPT that say when to stop, :data:`LOOSE` or :data:`TIGHT`.
 

@@ -62,7 +62,7 @@ class LimitMap:
         self._rates = np.concatenate([speeds, accelerations], axis=1)
 
     def compute_ratios(self, free: FloatArray) -> FloatArray:
-        """Return the largest share of a limit that each joint's motion uses on the grid, (n_dof,)."""
+        """Return the largest fraction of a limit that each joint's motion uses on the grid, (n_dof,)."""
         up, down, rate = self._compute_extremes(free[:, 1:] @ self._projection)
         return np.maximum((up + down) / 2, rate)
 
@@ -78,7 +78,7 @@ class LimitMap:
     def map_to_admissible(
         self, free: FloatArray, norm: float
     ) -> tuple[FloatArray, Callable[[FloatArray], FloatArray]]:
-        """Return admissible coefficients, and a function that pulls derivatives back through the mapping.
+        """Return admissible coefficients, and a function that maps derivatives back to the free ones.
 
         Args:
             free: Offset and harmonics of each joint, (n_dof, 1 + 2 harmonics).
@@ -129,7 +129,9 @@ class LimitMap:
         return fraction / np.sqrt(1 - fraction**2)
 
     def _compute_extremes(self, harmonics: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return the shares of half the position range up and down, and of the rates, (n_dof,) each."""
+        """Return the largest fractions of the limits that harmonics use, (n_dof,) each: of half the position range
+        upwards and downwards, and of the rates.
+        """
         position = _apply_map(self._positions, harmonics)
         rate = np.abs(_apply_map(self._rates, harmonics)).max(axis=1)
         up, down = position.max(axis=1), -position.min(axis=1)
@@ -138,20 +140,20 @@ class LimitMap:
     def _insert_offset(
         self, offset: FloatArray, harmonics: FloatArray, up: FloatArray, down: FloatArray
     ) -> FloatArray:
-        """Place the offset so that the motion stays in its range, whatever the free offset is."""
+        """Return the harmonics with an offset that keeps the motion in its range, for any free offset."""
         centre, room = (down - up) / 2, 1 - (up + down) / 2
         fraction = centre + room * _squash(offset)
         return np.column_stack([self._middle + self._reach * self.margin * fraction, harmonics])
 
 
 def _divide_by_limits(motion: FloatArray, limits: FloatArray) -> FloatArray:
-    """Return the maps from harmonics to shares of each joint's limit, (n_dof, n_points, 2 harmonics)."""
+    """Return the linear maps from harmonics to fractions of each joint's limit, (n_dof, n_points, 2 harmonics)."""
     shares: FloatArray = motion[None, :, 1:] / limits[:, None, None]
     return shares
 
 
 def _apply_map(coefficients: FloatArray, harmonics: FloatArray) -> FloatArray:
-    """Return the harmonics as seen through linear maps of the joints."""
+    """Return the harmonics after a linear map of each joint."""
     used: FloatArray = (coefficients @ harmonics[:, :, None])[:, :, 0]
     return used
 
@@ -169,7 +171,7 @@ def _squash(offset: FloatArray) -> FloatArray:
 def _compute_smooth_maximum(
     used: FloatArray, fractions: FloatArray, norm: float, signs: FloatArray | float = 1.0
 ) -> tuple[FloatArray, FloatArray]:
-    """Return the norm of each row of ``used``, (n_dof,), and its derivative by the harmonics.
+    """Return a smooth maximum over time of magnitudes, (n_dof,), and its derivative with respect to the harmonics.
 
     Args:
         used: Magnitudes, (n_dof, n_points).

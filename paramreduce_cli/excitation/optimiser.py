@@ -39,7 +39,7 @@ _ASTRAY = 0.25
 
 @dataclass(frozen=True)
 class Step:
-    """A step of a search: one level, and which candidates take it."""
+    """A step of a search: its level, and the fraction of the candidates that take part."""
 
     level: Level
     fraction: float
@@ -161,6 +161,7 @@ def optimise_trajectory(
         seed: Seed of the random starts; the result depends on nothing else.
 
     Raises:
+        NumericalError: No motion keeps the bounds; the message names the bound that is exceeded.
         NumericalError: No motion keeps the bounds; says which one stops it.
     """
     started = time.process_time()
@@ -278,7 +279,7 @@ class _Search:
         return iterations + self._minimise(candidate, step, self._grid)
 
     def _is_astray(self, candidate: _Candidate) -> bool:
-        """Return whether a candidate has another condition number on all points than on few."""
+        """Return whether a candidate's condition number on all points differs from that on the coarse grid."""
         if self._coarse is self._grid:
             return False
         if not np.isfinite(candidate.value):  # no way was found from where it began
@@ -295,7 +296,7 @@ class _Search:
         return not abs(ratio - 1) < _ASTRAY
 
     def _minimise(self, candidate: _Candidate, step: Step, grid: _Grid) -> int:
-        """Minimise a level's objective from a candidate, and return the iterations it took."""
+        """Minimise the objective of a step, starting from a candidate, and return the number of iterations."""
         end = minimise(
             self._build_objective(grid, step.level),
             candidate.free.ravel(),
@@ -371,7 +372,7 @@ def describe(
     iterations: int,
     status: str,
 ) -> Trajectory:
-    """Measure a trajectory: condition numbers, peaks, share of limits, bounded quantities.
+    """Compute the figures of a trajectory: condition numbers, peaks, fractions of limits, and bounded quantities.
 
     On the settings' grid, the bounded quantities on a finer one.
 

@@ -24,11 +24,11 @@ _SLOWDOWNS = 12
 def evaluate_point_to_point(
     motion: PointToPoint, time: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Evaluate a motion.
+    """Return the states of a motion at given times.
 
     Args:
         motion: The motion.
-        time: Since its beginning, (n_points,), s.
+        time: Times since the beginning of the motion, (n_points,), s.
 
     Returns:
         z, dz and ddz, each (n_points, n_dof).
@@ -51,7 +51,7 @@ def evaluate_along(motions: Sequence[PointToPoint], points: int, finer: int) -> 
 
     Args:
         motions: The motions.
-        points: Samples of each, from its beginning to its end.
+        points: Number of samples of each motion.
         finer: How many times finer the grid is on which loops are followed; 1 where there are none.
     """
 
@@ -134,7 +134,7 @@ class _MotionLimits:
         self._dynamics = Dynamics(model.mechanism)
 
     def find_fastest(self, start: FloatArray, end: FloatArray) -> PointToPoint | None:
-        """Return the fastest motion between two positions; None where there is none."""
+        """Return the fastest motion between two positions within the limits; None if there is none."""
         distance = np.abs(end - start)
         duration = max(
             float(np.max(_PEAK_SPEED * distance / self._limits.velocity)),
@@ -145,7 +145,7 @@ class _MotionLimits:
         if duration == 0 or not self._is_free(motion):
             return None
         for _ in range(_SLOWDOWNS):
-            if self._is_strong_enough(motion):
+            if self.keeps_load_limits(motion):
                 return motion
             motion = PointToPoint(start, end, motion.duration * _SLOWER)
         return None
@@ -161,7 +161,7 @@ class _MotionLimits:
             return False
         return bool((self._quantities.compute_rows(q) <= 0).all())
 
-    def _is_strong_enough(self, motion: PointToPoint) -> bool:
+    def keeps_load_limits(self, motion: PointToPoint) -> bool:
         """Whether the torques and powers that the model predicts for a motion are within their limits."""
         torque, power = self._limits.torque, self._limits.power
         if not (np.isfinite(torque).any() or np.isfinite(power).any()):

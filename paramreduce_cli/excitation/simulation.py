@@ -26,7 +26,7 @@ _METHOD = "LSODA"
 
 @dataclass(frozen=True)
 class Input:
-    """A force on an independent coordinate: sines of time, and feedback towards a rest."""
+    """A force on an independent coordinate: sines of time, and feedback towards a resting position."""
 
     amplitude: float = 0.0
     """Amplitude of each sine, N m or N."""
@@ -71,12 +71,12 @@ def simulate(
     start: FloatArray,
     time: FloatArray,
 ) -> SimulatedMotion:
-    """Move from rest under inputs.
+    """Simulate the mechanism from rest under given inputs.
 
     Args:
         dynamics: Dynamics of the mechanism.
         phi: Standard parameters of the full model, (n_parameters,).
-        inputs: One per independent coordinate.
+        inputs: Inputs, one per independent coordinate.
         start: Independent coordinates to start from, (n_dof,), rad or m.
         time: Time of the samples, from zero, (n_samples,), s.
 

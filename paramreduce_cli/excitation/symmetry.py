@@ -19,7 +19,7 @@ _MOST = 200
 
 @dataclass(frozen=True)
 class Symmetry:
-    """A symmetry: coordinate k moves as coordinate ``sources[k]`` did, times ``signs[k]``."""
+    """A symmetry of a motion: coordinate k moves as coordinate ``sources[k]``, times ``signs[k]``."""
 
     sources: tuple[int, ...]
     signs: tuple[int, ...]
@@ -40,8 +40,8 @@ def generate_group(given: Sequence[Sequence[str]], names: Sequence[str]) -> list
     """Return the group that some symmetries generate, the identity first.
 
     Args:
-        given: For each, the names of the coordinates that move in place of each one in turn,
-            ``-NAME`` where it moves the other way.
+        given: Symmetries; each lists, for every coordinate, the name of the coordinate whose motion it takes, ``-NAME``
+            for the opposite motion.
         names: Names of the independent coordinates, (n_dof,).
 
     Raises:

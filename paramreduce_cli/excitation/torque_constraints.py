@@ -34,7 +34,7 @@ class TorqueConstraints:
         return found
 
     def compute_rows(self, scaled: FloatArray, dz: FloatArray) -> FloatArray:
-        """Return squared shares of the limits minus one, (n_points, 2 n_dof)."""
+        """Return the squared ratios of torques and powers to their limits, minus one, (n_points, 2 n_dof)."""
         ratios = scaled * self._per_torque
         power = scaled * dz * self._per_power
         return np.column_stack([ratios, power]) ** 2 - 1
@@ -42,7 +42,7 @@ class TorqueConstraints:
     def compute_vector_jacobian_product(
         self, scaled: FloatArray, dz: FloatArray, bar: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
-        """Return the derivatives by scaled torques and by speeds, from the derivatives by the rows."""
+        """Return the derivatives with respect to scaled torques and speeds, from those with respect to the rows."""
         n = self.scale.size
         torque, power = bar[:, :n], bar[:, n:]
         moved = 2 * power * scaled * dz * self._per_power**2

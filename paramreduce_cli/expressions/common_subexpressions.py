@@ -31,7 +31,7 @@ from paramreduce_cli.records import IntArray
 
 @within
 def extract_common_pairs(rows: Rows, kind: int) -> None:
-    """Compute the pairs once that rows of a kind have in common."""
+    """Compute each pair of terms that several rows of a kind share only once."""
     which = SHARE_SUM if kind == SUM else SHARE_PRODUCT
     while True:
         n = take_next(rows, which)
@@ -91,14 +91,15 @@ def _find_most_shared(rows: Rows, n: int) -> tuple[int, int]:
 
 @within
 def _count_beside(rows: Rows, n: int, a: int, b: int, row: IntArray) -> tuple[int, int]:
-    """Return the number of other terms in a row that contains a pair, and the pair's sign; negative without the pair.
+    """Return the number of terms of a row besides a pair of terms, and the sign of the pair in the row; negative if the
+    row lacks the pair.
 
     Args:
-        rows: All of them.
-        n: The row.
-        a: One of the pair.
-        b: The other one.
-        row: Room for the terms beside them.
+        rows: Rows of sums and products.
+        n: Number of the row.
+        a: First term of the pair.
+        b: Second term of the pair.
+        row: Array to which the other terms are written.
     """
     for sign in range(2):
         length, has_a, has_b = 0, False, False

@@ -157,13 +157,13 @@ def find_compiler() -> tuple[str, ...] | None:
 
 
 def load(text: str) -> ctypes.CDLL | None:
-    """Compile C text to a library, or take it from the cache.
+    """Compile C text to a library, or load the library from the cache.
 
     Args:
-        text: All of it.
+        text: Complete C source.
 
     Returns:
-        The library; None without a compiler, or if it fails.
+        The library; None if there is no compiler or compilation fails.
     """
     cc = find_compiler()
     if cc is None:
@@ -195,9 +195,10 @@ def load(text: str) -> ctypes.CDLL | None:
 
 
 def _load_library(command: list[str], text: str, path: Path) -> ctypes.CDLL:
-    """Load a library, and compile it first if it is not kept.
+    """Load a library from the cache; compile it first if the cache lacks it.
 
     Raises:
+        OSError: The folder does not allow writing files or running code.
         OSError: Nothing can be written there, or run from there.
         subprocess.CalledProcessError: The compiler fails.
     """

@@ -34,13 +34,13 @@ class Values(NamedTuple):
         return self.graph.count_operations(self.outputs)
 
     def simplify(self) -> "Values":
-        """Return the same values after the simplification rules are applied to a fixed point."""
+        """Return the same values after the simplification rules have been applied until none saves an operation."""
         rows = self.to_rows()
         rewrite(rows, 0)
         return self.from_rows(rows)
 
     def to_rows(self) -> Rows:
-        """Return sums and products of many terms, by the numbers of the nodes."""
+        """Return sums and products as rows of terms, which rewriting works on; a row has the index of its node."""
         nodes, reached = self.graph.nodes, self.graph.find_reached(self.outputs)
         uses = Counter(value >> 1 for value in self.outputs)
         for number in reached:
@@ -76,15 +76,15 @@ class Values(NamedTuple):
 
 
 def minimise_operations(candidates: Iterable[Values], seed: int = 0) -> Values:
-    """Return the values with the fewest operations found.
+    """Return the leanest values that rewriting finds.
 
     Args:
-        candidates: The same values, written in one or several ways; those that are far behind before they are
-            rewritten are dropped.
-        seed: Seed of the random changes; other seeds may end elsewhere.
+        candidates: The same values, written in one or several ways; only those with nearly the fewest operations are
+            rewritten.
+        seed: Seed of the random changes.
 
     Returns:
-        What takes the fewest operations.
+        Values with the fewest operations found.
     """
     apart = [(candidate, candidate.to_rows()) for candidate in candidates]
     for _, rows in apart:

@@ -52,7 +52,7 @@ class Function:
         return {positions[number][0].name for number in numbers}
 
     def restrict_arguments(self, names: Collection[str]) -> Function:
-        """Return the function with some of its arguments only; it uses no others."""
+        """Return the function with only the named arguments, which must include all that it uses."""
         positions = enumerate(self.list_positions(self.arguments))
         kept = [position for position, (argument, _) in positions if argument.name in names]
         arguments = tuple(a for a in self.arguments if a.name in names)

@@ -149,7 +149,7 @@ class Graph:
         return value ^ sign
 
     def call(self, function: str, *values: int) -> int:
-        """Return a function of values: sin, cos, sqrt, /, atan2, ..."""
+        """Return the reference to a function of values: sin, cos, sqrt, /, atan2, ..."""
         if values == (ZERO,) and function in ("sin", "cos", "sign", "tanh"):
             return self.constant(float(function == "cos"))
         if len(values) == 1 and self._signs_free and function in _ODD:

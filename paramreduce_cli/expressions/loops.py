@@ -47,9 +47,10 @@ class _CheckedCache(IndexDataCacheFile):
 
 
 def _read_checked(path: str) -> bytes:
-    """Return the content of a file before its checksum.
+    """Return the content of a file without the checksum at its end.
 
     Raises:
+        OSError: The file cannot be read, or its content does not match the checksum.
         OSError: It cannot be read, or its checksum does not fit.
     """
     content = Path(path).read_bytes()
@@ -74,12 +75,13 @@ def inline(function: Loop) -> Loop:
 
 
 def compile_loop(*, within: bool = False, makes_arrays: bool = True) -> Callable[[Loop], Loop]:
-    """Compile a function at its first call, and keep the result; other threads run on meanwhile.
+    """Compile a function with Numba at its first call, and cache the result; other threads run on meanwhile.
 
     Args:
-        within: Whether only compiled functions call it; nothing is compiled for calls from Python, which end the process.
-        makes_arrays: Whether it does; otherwise all that it sees belong to what calls it, and references to them
-            are not counted, which is done at each call and takes half of the time, and more, of small functions.
+        within: Whether only compiled functions call it. A call from Python then ends the process, because no wrapper
+            for Python is compiled.
+        makes_arrays: Whether the function allocates arrays. If not, reference counting is switched off, which takes
+            half of the time of small functions.
     """
 
     def made(function: Loop) -> Loop:

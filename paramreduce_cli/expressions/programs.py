@@ -94,7 +94,7 @@ class Program:
 
     @classmethod
     def from_graph(cls, graph: Graph, outputs: Sequence[int]) -> Program:
-        """Return the program of some values in a graph."""
+        """Return the program that computes some values of a graph."""
         reached = graph.find_reached(list(outputs))
         place = {node: 2 * k for k, node in enumerate(reached)}
 
@@ -143,11 +143,11 @@ class Program:
 
         Args:
             graph: Graph that the nodes are added to.
-            substitute: The value in that graph of an input, by position; the input of the same
-                position if there is none.
+            substitute: Function that returns the reference, in that graph, that replaces an input, given its position;
+                by default the input stays.
 
         Returns:
-            The outputs.
+            References to the outputs.
         """
         substitute = substitute or graph.input
         values: list[int] = []
@@ -178,7 +178,7 @@ class Program:
         """Return the program with its inputs at other positions.
 
         Args:
-            place: Position of an input, by the one it has now; negative for one that is zero.
+            place: New position of each input, by its present position; negative if the input is zero.
         """
         graph = Graph()
 
@@ -195,11 +195,11 @@ class Program:
         same: Mapping[int, int] = _NOTHING,
         signs_free: bool = True,
     ) -> int:
-        """Count the operations that remain when some inputs are zero.
+        """Return the number of operations that remain when some inputs are zero.
 
         Args:
-            zero_inputs: Positions of inputs that are zero.
-            same: Positions of inputs that hold the same value as another one.
+            zero_inputs: Positions of the inputs that are zero.
+            same: Positions of inputs, and of the inputs whose value they share.
             signs_free: Whether sign changes cost nothing.
 
         Returns:
@@ -217,7 +217,7 @@ class Program:
         """Return the values of the outputs for many samples.
 
         Args:
-            inputs: One per position, all of one shape or scalar; in their precision all is calculated.
+            inputs: Values of each input, arrays of one shape or scalars; results have their precision.
         """
         values: list[FloatArray] = []
         precision = np.result_type(np.float32, *inputs)

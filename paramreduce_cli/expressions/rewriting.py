@@ -79,9 +79,9 @@ def _distribute(rows: Rows, n: int, place: int, joined: bool) -> None:
 
     Args:
         rows: Rows of sums and products; changed in place.
-        n: The product.
-        place: Place of the sum among its factors.
-        joined: Whether products in the sum are written out.
+        n: Number of the product's row.
+        place: Position of the sum among the factors.
+        joined: Whether products inside the sum are multiplied out.
     """
     row, total = rows.room[0], rows.room[1]
     factor = rows.terms[n, place]

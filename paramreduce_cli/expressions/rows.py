@@ -39,7 +39,7 @@ within = compile_loop(within=True, makes_arrays=False)
 
 
 class Rows(NamedTuple):
-    """A record of all rows of some values, in few arrays, as each costs compilation time."""
+    """A record of the rows of sums and products of some values, in few arrays, because each array adds compilation time."""
 
     numbers: IntArray
     """Counters of every number, (size, WAITS + lists)."""
@@ -68,12 +68,12 @@ def make_rows(
     numbers: int,
     others: int,
 ) -> Rows:
-    """Return rows in arrays, all on the worklist.
+    """Return rows in arrays, all of them on the worklist.
 
     Args:
-        sums: Terms of sums.
-        products: Terms of products, none of them negative.
-        pinned: Numbers that something else refers to.
+        sums: Terms of each sum, by number.
+        products: Terms of each product, by number; none is negative.
+        pinned: Numbers of rows that outputs or functions refer to.
         numbers: Number of slots in use.
         others: Operations that have no row.
     """
@@ -108,7 +108,7 @@ def make_rows(
 
 
 def list_terms(rows: Rows, kind: int) -> dict[int, list[int]]:
-    """Return all rows of a kind by number."""
+    """Return the terms of all rows of a kind, by the number of the row."""
     numbers = np.flatnonzero(rows.numbers[:, KIND] == kind).tolist()
     return {n: rows.terms[n, : rows.numbers[n, LENGTH]].tolist() for n in numbers}
 
@@ -123,7 +123,7 @@ def draw_random(rows: Rows) -> int:
 
 @within
 def find_term(rows: Rows, n: int, value: int, start: int) -> int:
-    """Return the place of a term in a row, from a start on, or END."""
+    """Return the position of a term in a row, from position ``start`` on; END if there is none."""
     for k in range(start, rows.numbers[n, LENGTH]):
         if rows.terms[n, k] == value:
             return k
@@ -141,7 +141,7 @@ def wait(rows: Rows, which: int, number: int) -> None:
 
 @within
 def take_next(rows: Rows, which: int) -> int:
-    """Return and remove the last number of a worklist; negative if it is empty, or after a failure."""
+    """Return and remove the last row number of a worklist; negative if the list is empty or an earlier step failed."""
     if rows.counters[WAITING + which] == 0 or rows.counters[FAILED]:
         return END
     rows.counters[WAITING + which] -= 1
@@ -203,13 +203,13 @@ def _cancel(row: IntArray) -> int:
 
 @on_rows
 def put(rows: Rows, number: int, kind: int, row: IntArray) -> None:
-    """Replace the row of a number; fails if the row is too long.
+    """Replace the terms of a row. If they are too many, the row stays and the counter FAILED is set.
 
     Args:
-        rows: All of them.
-        number: Whose row it is.
-        kind: Operation of the row: sum or product.
-        row: Terms of the row, changed in place; opposites in a sum cancel, and an empty sum is zero.
+        rows: Rows of sums and products; changed in place.
+        number: Number of the row.
+        kind: Operation of the new row: sum or product.
+        row: New terms; opposite terms of a sum cancel, and an empty sum becomes zero.
     """
     if kind == SUM:
         length = _cancel(row)
@@ -245,7 +245,7 @@ def remove(rows: Rows, number: int) -> None:
 
 @within
 def add_row(rows: Rows, kind: int, row: IntArray) -> int:
-    """Return a reference to a new number with a row; it fails if no number is left."""
+    """Add a row, and return the reference to it; the counter FAILED is set if no number is free."""
     number = rows.counters[LAST]
     for _ in range(rows.numbers.shape[0]):
         number = max(1, (number + 1) % rows.numbers.shape[0])  # zero is zero

@@ -25,17 +25,17 @@ _DIGITS = 6
 
 
 def rescale(program: Program, n: int) -> tuple[Program, FloatArray]:
-    """Return the same function of inputs in other units, with few products with constants left.
+    """Return the same function of inputs in other units, chosen so that few products with constants are left.
 
     Those that vanish together in most places are made to first, then others as far as these leave it open.
 
     Args:
         program: Program of sums, products and functions, numbers folded as a :class:`Graph` folds them.
-        n: Number of first inputs that may come in other units.
+        n: Number of inputs, the first ones, whose units may change.
 
     Returns:
-        The program, and the sizes of the units that these inputs come in, (n,): what they were is so many
-        times what they are.
+        The program, and the sizes of the new units of these inputs, (n,): an input has its former value divided by its
+        size.
     """
     units = _Units(program, n)
     units.eliminate_products()
@@ -107,7 +107,7 @@ class _Rescaler:
 
 
 class _Units:
-    """The s of all nodes, as far as equations between them do not leave it open.
+    """The units of all nodes, as factors, as far as equations between them fix these.
 
     Args:
         program: Whose nodes.

@@ -33,7 +33,7 @@ from paramreduce_cli.expressions.rows import (
 
 @within
 def simplify_to_fixed_point(rows: Rows, products_first: bool) -> None:
-    """Apply all laws until none saves an operation.
+    """Apply all simplification rules until none saves an operation.
 
     Args:
         rows: Rows of sums and products; changed in place.
@@ -87,7 +87,7 @@ def tidy(rows: Rows) -> None:
 
 @within
 def _resolve(rows: Rows, n: int) -> None:
-    """Replace a row by its only term wherever it is used; products hold no negative terms."""
+    """Replace a row that has only one term by this term wherever the row is used; terms of products are never negative."""
     width = rows.terms.shape[1]
     negative = rows.terms[n, 0] & 1
     slot = rows.numbers[n, HEAD]

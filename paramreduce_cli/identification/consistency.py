@@ -71,7 +71,7 @@ def list_constraints(
 
 
 def _compute_body_scales(values: FloatArray) -> FloatArray:
-    """Return the size of a large change of a body's ten parameters, from its mass and radius of gyration."""
+    """Return the magnitude of a large change of a body's ten parameters, from its mass and radius of gyration."""
     mass = abs(float(values[0])) or _UNKNOWN_MASS
     squared = abs(float(values[[4, 7, 9]].sum())) / (2 * mass)
     radius = np.sqrt(squared) if squared > 0 else _UNKNOWN_RADIUS
@@ -94,7 +94,8 @@ def compute_smallest_eigenvalues(physical: Physical, values: FloatArray) -> Floa
 
 
 def fit_unconstrained(factor: FloatArray, physical: Physical) -> FloatArray:
-    """Return the parameters nearest to the known ones that fit the data, physical or not, (n_parameters,).
+    """Return the parameters that fit the data and are nearest to the known ones, (n_parameters,); they need not be
+    physical.
 
     Args:
         factor: Triangular factor of [W | tau] with rows divided by the noise, (k, n + 1).
@@ -107,7 +108,7 @@ def fit_unconstrained(factor: FloatArray, physical: Physical) -> FloatArray:
 
 
 def _stack_rows(factor: FloatArray, physical: Physical) -> tuple[FloatArray, FloatArray]:
-    """Return the rows of the data and of the known values, in units of the scales."""
+    """Return the rows of the data and of the known values; parameters are divided by their scales."""
     W, tau = factor[:, :-1], factor[:, -1]
     n = physical.known.size
     A = np.vstack([W * physical.sizes, np.eye(n)])
@@ -115,7 +116,7 @@ def _stack_rows(factor: FloatArray, physical: Physical) -> tuple[FloatArray, Flo
 
 
 def fit_consistent(factor: FloatArray, physical: Physical, distance: str) -> FloatArray:
-    """Return the physical parameters nearest to the data and to the known ones, (n_parameters,).
+    """Return the physical parameters that fit the data best and are nearest to the known ones, (n_parameters,).
 
     Args:
         factor: Triangular factor of [W | tau] with rows divided by the noise, (k, n + 1).
@@ -162,7 +163,7 @@ def _scale_rows(factor: FloatArray, physical: Physical) -> tuple[FloatArray, Flo
 
 
 def _compute_units(physical: Physical, body: int) -> FloatArray:
-    """Return units of a body's pseudo-inertia matrix in which a body of its size is near the identity."""
+    """Return the scales of a body's pseudo-inertia matrix, with which the matrix of the known body is near the identity."""
     mass, second = physical.sizes[physical.columns[body]][[0, 4]]
     return np.diag([1 / np.sqrt(second)] * 3 + [1 / np.sqrt(mass)])
 
@@ -185,8 +186,10 @@ def _express_bodies(cp: Any, physical: Physical, x: Any) -> tuple[list[Any], lis
 
 
 def _express_divergence(cp: Any, physical: Physical, bodies: Sequence[Any]) -> Any:
-    """Return the divergence of the bodies from the known ones as an expression, or raise DataError if a known body is
-    not physical.
+    """Return the divergence of the bodies from the known ones as an expression.
+
+    Raises:
+        DataError: A known body is not physical.
     """
     cost = 0
     for body, (name, row) in enumerate(zip(physical.names, physical.columns, strict=True)):

@@ -16,7 +16,7 @@ _SHORTEST = 20
 
 @dataclass(frozen=True)
 class Piece:
-    """A piece of a motion with the times between which it is used."""
+    """A piece of a motion, and the interval of time whose samples are used; the rest only serves filters."""
 
     signals: Signals
     first: float
@@ -35,7 +35,7 @@ class Piece:
 
 
 def trim_files(pieces: list[Signals], section: LogSection) -> list[Piece]:
-    """Return pieces without the cut-off start and end of a file, which still serve filters."""
+    """Return pieces whose samples near the start and the end of a file are not used; they still serve filters."""
     first, last = pieces[0].time[0] + section.trim[0], pieces[-1].time[-1] - section.trim[1]
     if section.standstill == "cut":
         time = np.concatenate([piece.time for piece in pieces])
@@ -51,7 +51,10 @@ def trim_files(pieces: list[Signals], section: LogSection) -> list[Piece]:
 
 
 def split_pieces(pieces: list[Piece], fraction: float) -> tuple[list[Piece], list[Piece]]:
-    """Return a first share of the used samples, and the rest; pieces that are too short are left out."""
+    """Split pieces in time: return pieces with the first fraction of the used samples, and pieces with the rest.
+
+    Pieces that would be too short are left out.
+    """
     left = int(fraction * sum(p.used.stop - p.used.start for p in pieces))
     first, second = [], []
     for piece in pieces:

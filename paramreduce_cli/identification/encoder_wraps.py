@@ -13,6 +13,8 @@ _BESIDE = 4
 def unwrap_positions(z: FloatArray) -> tuple[int, ...]:
     """Make positions continuous in place by adding whole revolutions where they jump.
 
+    A step counts as a revolution if the positions before and after it continue each other without it.
+
     A step counts as a whole turn where the positions before and after it go on as if it were not there.
 
     Args:

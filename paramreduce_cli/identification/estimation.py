@@ -60,11 +60,11 @@ class Rows:
 
 
 def collect_rows(blocks: Iterable[Block], columns: FloatArray, n_samples: int) -> Rows:
-    """Return the rows of a model, taken evenly from all trajectories if there are too many.
+    """Return the rows of a model, evenly spread over all trajectories if there are too many.
 
     Args:
         blocks: The samples.
-        columns: Standard parameters by those of the model, (n_standard, p).
+        columns: Matrix that expresses the model's columns by those of the standard parameters, (n_standard, p).
         n_samples: Number of samples.
     """
     fraction = min(1.0, _MOST_SAMPLES / n_samples)
@@ -98,8 +98,8 @@ def fit_robustly(
     """Fit parameters by iteratively reweighted least squares with Huber's weights [Huber1964].
 
     Args:
-        make: Yields (X, tau) blocks of all samples anew, (n, n_dof, p) and (n, n_dof).
-        start: Parameters to begin with, (p,).
+        make: Function that yields (X, tau) blocks of all samples, (n, n_dof, p) and (n, n_dof), at each call.
+        start: Start values of the parameters, (p,).
         deviation: Standard deviation of each joint's noise, (n_dof,); infinite where torques are not measured.
 
     Returns:
@@ -127,7 +127,7 @@ def fit_robustly(
 
 @dataclass(frozen=True)
 class LinearFit:
-    """A weighted least-squares estimate with what its noise is like.
+    """A weighted least-squares fit and the statistics of its residuals.
 
     Attributes:
         rows: Rows of the model.
@@ -156,12 +156,12 @@ class LinearFit:
 
     @cached_property
     def residuals(self) -> list[FloatArray]:
-        """Torques that are left, (n_samples, n_dof) for each part."""
+        """Residuals of the torques, (n_samples, n_dof) for each part."""
         pairs = zip(self.rows.X, self.rows.tau, strict=True)
         return [tau - X @ self.parameters for X, tau in pairs]
 
     def compute_residuals_of(self, noise: Sequence[FloatArray]) -> list[FloatArray]:
-        """Return the residuals of other torques after a fit, (n_samples, n_dof) for each part."""
+        """Return the residuals that other torques leave after a fit, (n_samples, n_dof) for each part."""
         score = sum(
             np.einsum("njp,nj->p", X, e * self.weights)
             for X, e in zip(self.rows.X, noise, strict=True)
@@ -172,6 +172,8 @@ class LinearFit:
     @cached_property
     def noise(self) -> list[ColouredNoise]:
         """Coloured noise of each joint.
+
+        The fit absorbs slow noise; how much is estimated from simulated noise that is fitted alike, and added back.
 
         A fit takes slow noise out of its residuals; the loss is estimated from simulated noise that is fitted alike,
         and added back.

@@ -29,7 +29,7 @@ _DERIVATIVE = np.array([1 / 280, -4 / 105, 1 / 5, -4 / 5, 0.0, 4 / 5, -1 / 5, 4 
 
 
 def design_low_pass(cutoff: float, rate: float) -> FloatArray:
-    """Return the coefficients of a symmetric low-pass, (2 k + 1,), or a single one if it would change nothing.
+    """Return the coefficients of a symmetric low-pass filter, (2 k + 1,), or a single one if no filter is needed.
 
     Args:
         cutoff: Frequency at which half of the amplitude passes, Hz; may be infinite.
@@ -43,8 +43,7 @@ def design_low_pass(cutoff: float, rate: float) -> FloatArray:
 
 
 def apply_filter(x: FloatArray, taps: FloatArray) -> FloatArray:
-    """Return the signal through a symmetric filter, as long as before, or the signal itself if the filter changes
-    nothing. Beyond its ends the signal is continued by its point reflection, which keeps values and slopes.
+    """Return a filtered signal of the same length, or the signal itself for a filter of one coefficient.
 
     Args:
         x: Signals, (n_samples, n).
@@ -60,7 +59,7 @@ def apply_filter(x: FloatArray, taps: FloatArray) -> FloatArray:
 
 
 def _extend(x: FloatArray, k: int) -> FloatArray:
-    """Return a column with k samples more at both ends."""
+    """Return a column extended by k samples at both ends."""
     if x.size == 1:
         return np.repeat(x, 2 * k + 1)
     while k > 0:  # in steps where the filter is longer than the signal
@@ -78,13 +77,13 @@ def differentiate(x: FloatArray, rate: float) -> FloatArray:
 def filter_samples(
     rows: FloatArray, first: int, taps: FloatArray, outputs: np.ndarray
 ) -> FloatArray:
-    """Return single samples of a filtered signal.
+    """Return some samples of a filtered signal.
 
     Args:
         rows: Rows of the signal, (n_rows, n).
-        first: Number of its first row.
+        first: Index of the first row within the signal.
         taps: Coefficients of a symmetric filter, (2 k + 1,).
-        outputs: Numbers of the wanted samples, whose neighbourhood of k rows must be there.
+        outputs: Indices of the requested samples; the rows must include their k neighbours.
 
     Returns:
         (n_outputs, n)
@@ -101,7 +100,7 @@ def estimate_spectrum(columns: Iterable[FloatArray], rate: float) -> tuple[Float
     """Return frequencies, (n_frequencies,), Hz, and power spectral densities, (n_frequencies, n) [Welch1967].
 
     Args:
-        columns: Signals, (n_samples,) each; one at a time, as segments overlap, and are all there at once.
+        columns: Signals, (n_samples,) each; read one at a time, to save memory.
         rate: Samples per second.
     """
     densities = []

@@ -111,7 +111,9 @@ def _hint_at_large_errors(full: Estimate) -> Iterator[str]:
 
 
 def _hint_at_impossible_bodies(full: Estimate, consistency: Consistency | None) -> Iterator[str]:
-    """Yield a hint if only bodies that cannot exist explain the torques, as with the kinematics of another robot."""
+    """Yield a hint if only physically impossible bodies explain the torques, which suggests the kinematics of another
+    robot.
+    """
     if consistency is None or full.train > _HARDLY:
         return
     if consistency.train > max(_IMPOSSIBLE * full.train, full.train + _BESIDE):

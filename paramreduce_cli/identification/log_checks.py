@@ -30,7 +30,7 @@ _PER_PERIOD = 20
 def find_log_warnings(
     piece: Signals, rate: float, names: Sequence[str], unmeasured: Collection[str] = ()
 ) -> Iterator[str]:
-    """Yield warnings on joints that stand still, units, signs, the order of columns, and limits.
+    """Yield warnings about joints that stand still, and about implausible units, signs, orders of columns, and limits.
 
     Args:
         piece: Uninterrupted motion as recorded.
@@ -84,7 +84,7 @@ def _find_longest_run(flags: np.ndarray) -> int:
 
 
 def _low_pass(columns: Iterable[FloatArray], rate: float) -> FloatArray:
-    """Return the slow part of signals, at as many samples as that needs."""
+    """Return low-passed signals at a lower rate that suffices for them."""
     taps = filters.design_low_pass(_FASTEST, rate)
     slow = []
     for column in columns:
@@ -96,7 +96,7 @@ def _low_pass(columns: Iterable[FloatArray], rate: float) -> FloatArray:
 def _compare_speeds(
     z: FloatArray, dz: FloatArray, rate: float, names: Sequence[str]
 ) -> Iterator[str]:
-    """Yield warnings on recorded speeds that are no derivatives of the positions."""
+    """Yield warnings about recorded speeds that are not the derivatives of the positions."""
     slopes = _low_pass((np.gradient(column, 1 / rate) for column in z.T), rate)
     speeds = _low_pass(dz.T, rate)
     messages: dict[str, list[str]] = {}

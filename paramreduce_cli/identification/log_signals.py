@@ -38,7 +38,7 @@ class Place:
 
 
 def find_longest(learned: list[list[Piece]], held_out: list[list[Piece]], rate: float) -> Place:
-    """Return the longest training motion, with the held-out part of the same motion.
+    """Return the longest training motion, together with the held-out part of the same motion.
 
     Args:
         learned: Training motions, at least one.
@@ -60,7 +60,7 @@ def find_longest(learned: list[list[Piece]], held_out: list[list[Piece]], rate: 
 
 
 def iterate_speeds(piece: Signals, rate: float) -> Iterator[FloatArray]:
-    """Return the speeds as recorded, or differences of positions, joint by joint."""
+    """Yield the speeds joint by joint: recorded ones, or differences of positions if none were recorded."""
     if piece.dz is not None:
         return iter(piece.dz.T)
     # Plain differences: noise that is white in the positions rises to the end of the spectrum.
@@ -128,7 +128,7 @@ def _find_bounds(piece: Piece) -> FloatArray:
 
 
 def _decimate(piece: Signals, *others: Iterator[FloatArray]) -> list[FloatArray]:
-    """Return times, positions and others decimated, as copies, so that the rest can be freed."""
+    """Return copies of decimated times, positions and other signals, so that the full signals can be freed."""
     every = slice(None, None, max(1, piece.time.size // _MOST_SHOWN))
     columns = (iter(piece.z.T), *others)
     made = (np.column_stack([column[every] for column in joints]) for joints in columns)

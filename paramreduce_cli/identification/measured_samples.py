@@ -28,7 +28,7 @@ _STATES = ("time", "z", "dz", "ddz", "q", "dq", "ddq")
 
 @dataclass(frozen=True)
 class _Stretch:
-    """A stretch of uninterrupted motion, and the samples that are taken from it."""
+    """A stretch of uninterrupted motion, and which of its samples are used."""
 
     first: int
     """Number of its first sample among all."""
@@ -79,14 +79,14 @@ def _find_runs(motions: MeasuredMotions) -> tuple[IntArray, IntArray, IntArray]:
 
 
 def _find_last_samples(edges: IntArray, outputs: range) -> list[int]:
-    """Return a sample of every fold that has any among some samples."""
+    """Return the last sample of every fold that has any among some samples."""
     later = [bisect_left(outputs, int(edge)) for edge in edges]
     return sorted({outputs[k] for k in (*later, len(outputs) - 1) if 0 <= k < len(outputs)})
 
 
 @dataclass
 class LoggedSet:
-    """A set of measured samples, computed as they are read; its folds are its trajectories.
+    """A set of measured samples, computed as they are read; each fold counts as a trajectory.
 
     If torques pass a low-pass, every column of the observation matrix passes the same one, so that the model stays
     linear and exact [Gautier1997]; states are those at the sample's own time. Only slices of the motions are read.
@@ -161,7 +161,7 @@ class LoggedSet:
         return StateBlock(span.trajectory, *states, self._get_torques(part))
 
     def _filter_blocks(self, stretch: _Stretch, blocks: Iterator[Block]) -> Iterator[Block]:
-        """Yield blocks of the used samples; only rows that the low-pass still needs are held."""
+        """Yield blocks of the used samples; only the rows that the low-pass still needs stay in memory."""
         waiting = stretch.outputs
         k = self._taps.size // 2
         held: list[Block] = []
@@ -180,7 +180,7 @@ class LoggedSet:
                 first += held.pop(0).time.size
 
     def _make_block(self, held: list[Block], first: int, outputs: IntArray, fold: int) -> Block:
-        """Return the block of some output samples from the held rows."""
+        """Return the block of some output samples from the rows in memory."""
 
         def joined(key: str) -> FloatArray:
             return np.concatenate([getattr(block, key) for block in held])

@@ -21,7 +21,7 @@ _TO_SIGMA = 1.4826
 
 
 def replace_outliers(pieces: list[Signals]) -> dict[tuple[str, int], list[float]]:
-    """Interpolate single samples far from the median of their neighbours [Hampel1974], in place.
+    """Replace single samples far from the median of their neighbours by interpolation [Hampel1974], in place.
 
     Returns:
         Times of the samples that were replaced, s, by signal and joint; only of those that had any.
@@ -45,7 +45,7 @@ def replace_outliers(pieces: list[Signals]) -> dict[tuple[str, int], list[float]
 
 
 def _smooth_largest(away: FloatArray) -> FloatArray:
-    """Return the largest medians of stretches and their neighbours, as noise varies along a motion."""
+    """Return the largest median of each stretch and its neighbours, because noise varies along a motion."""
     whole = away[: away.size // _STRETCH * _STRETCH].reshape(-1, _STRETCH)
     # Some at a time, as medians are of copies.
     parts = [np.median(whole[k : k + _AT_ONCE], axis=1) for k in range(0, len(whole), _AT_ONCE)]
@@ -56,7 +56,7 @@ def _smooth_largest(away: FloatArray) -> FloatArray:
 
 
 def _find_spikes(column: FloatArray, rows: IntArray, least: FloatArray) -> BoolArray:
-    """Return which samples stand out from both neighbours on one side; samples of a step do not."""
+    """Return which samples lie above or below both neighbours by more than ``least``; samples of a step do not."""
     before = column[rows] - column[np.maximum(rows - 1, 0)]
     after = column[rows] - column[np.minimum(rows + 1, column.size - 1)]
     found: BoolArray = (before * after > 0) & (np.minimum(np.abs(before), np.abs(after)) > least)

@@ -40,7 +40,7 @@ class PositionJumps:
 
 
 def find_position_jumps(signals: Signals) -> PositionJumps:
-    """Find runs of bad rows, and steps of positions that stay.
+    """Find runs of bad rows, and steps after which positions stay changed.
 
     The recording is followed from its longest stretch without jumps to both ends. What lies between two
     stretches that the joints can reach from each other is bad; where no stretch within a quarter of a second can be
@@ -120,7 +120,7 @@ def _follow_stretches(
 
 
 def _find_jumps(signals: Signals, speed: FloatArray, slack: FloatArray) -> IntArray:
-    """Return the rows after which a position moves farther than its joint can, (n_jumps,)."""
+    """Return the rows after which a position changes by more than the joint can move, (n_jumps,)."""
     duration = np.diff(signals.time)
     jumps = np.zeros(duration.size, bool)
     for j, column in enumerate(signals.z.T):  # one after the other, as there may be gigabytes
@@ -160,7 +160,7 @@ def _compute_ranges(z: FloatArray) -> FloatArray:
 
 
 def _repeat_bad_rows(signals: Signals, bad: BoolArray) -> BoolArray:
-    """Whether rows hold the numbers that most rows with these numbers are bad by."""
+    """Whether rows repeat numbers that occur mostly in bad rows."""
     if not bad.any():
         return bad
     parts = [part for part in (signals.z, signals.dz, signals.ddz, signals.tau) if part is not None]
@@ -174,7 +174,7 @@ def _repeat_bad_rows(signals: Signals, bad: BoolArray) -> BoolArray:
 
 
 def name_rows(rows: IntArray, first_line: int | None) -> str:
-    """Name runs of rows for a message, the first few of them.
+    """Return runs of rows as text for a message; only the first few are listed.
 
     Args:
         rows: Numbers of rows from 0, in order, (n_rows,).

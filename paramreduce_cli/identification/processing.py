@@ -229,7 +229,8 @@ def _cut_out_jumps(
         first_line: Line of the first row in its file, None where the file has no lines.
 
     Returns:
-        The recording; its rows with which a motion begins anew after a step; sentences on what was done.
+        The recording without bad rows; rows after which positions stay changed, at which the recording is to be split;
+        sentences on what was done.
     """
     messages = []
     if any(recorded.turns):
@@ -259,6 +260,7 @@ def _compensate_delay(recorded: Signals, delay: float, source: str) -> None:
     """Shift torques to the times at which they acted, in place.
 
     Raises:
+        ConfigError: No torque was recorded at the shifted times.
         ConfigError: None of them was recorded then.
     """
     time = recorded.time
@@ -329,7 +331,7 @@ def _describe_low_pass(cutoff: float) -> str:
 
 
 def _choose_decimation(section: LogSection, cutoffs: _Cutoffs, rate: float) -> int:
-    """Return the decimation factor of the motions: one of how many samples of the log is kept."""
+    """Return the decimation factor of the motions."""
     if np.isfinite(cutoffs.torque):
         needed = _PER_TORQUE_CUTOFF * cutoffs.torque
         if np.isfinite(cutoffs.state):
@@ -355,7 +357,7 @@ def _check_left(parts: list[list[Piece]], sources: list[str], section: LogSectio
 
 
 def _process_piece(piece: Piece, rate: float, cutoffs: _Cutoffs, thin: int) -> Piece:
-    """Return a piece low-passed, differentiated and decimated, joint by joint, as whole signals may be gigabytes."""
+    """Return a low-passed, differentiated and decimated piece; joints are processed one by one to save memory."""
     s = piece.signals
     state = filters.design_low_pass(cutoffs.state, rate)
     torque = np.ones(1)
@@ -376,7 +378,7 @@ def _process_piece(piece: Piece, rate: float, cutoffs: _Cutoffs, thin: int) -> P
 def _process_joint(
     s: Signals, rate: float, state: FloatArray, torque: FloatArray
 ) -> tuple[FloatArray, ...]:
-    """Return z, dz, ddz and tau of one joint, (n_samples, 1) each, through the filters of states and torques."""
+    """Return z, dz, ddz and tau of one joint after their filters, (n_samples, 1) each."""
     if np.ptp(s.z) == 0:  # round-off of filters would be taken for a motion
         still = np.zeros_like(s.z)
         return s.z, still, still, filters.apply_filter(s.tau, torque)

@@ -69,7 +69,7 @@ def measure_quality(mechanism: Mechanism, log: MeasuredLog, measured: BoolArray)
 
 
 def _compute_independent_fractions(X: FloatArray, lengths: FloatArray) -> FloatArray:
-    """Return the share of each column of unit length that the others do not explain, (n,)."""
+    """Return the fraction of each column's length that the other columns do not explain, (n,)."""
     inverse = np.linalg.pinv(X.T @ X, rcond=_DEPENDENT**2, hermitian=True)
     diagonal = np.diag(inverse)
     hidden = 1 - np.diag(inverse @ (X.T @ X))  # columns that others make up altogether
@@ -78,7 +78,7 @@ def _compute_independent_fractions(X: FloatArray, lengths: FloatArray) -> FloatA
 
 
 def estimate_noise_floor(log: MeasuredLog, nominal: FloatArray) -> float:
-    """Return the torque error that noise alone leaves, assuming the same density in the band of the model as above it.
+    """Return the torque error that noise alone causes; its density within the model's band is assumed to be that above.
 
     Args:
         log: Processed log.

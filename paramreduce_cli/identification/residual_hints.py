@@ -59,7 +59,7 @@ def find_residual_hints(
     sliding: Sequence[bool] = (),
     modelled: Collection[str] = (),
 ) -> list[str]:
-    """Return hints that the residuals suggest, the strongest first.
+    """Return hints about likely causes of the residuals, the strongest first.
 
     Args:
         fitted: Fit of all base parameters on the training data.
@@ -102,13 +102,15 @@ def find_residual_hints(
 
 
 def _is_convincing(sureness: float, fraction: float, coefficient: float) -> bool:
-    """Return whether a signal is significant and explains enough of the residuals."""
+    """Return whether a signal is significant and explains enough of the residuals to be reported."""
     sure = abs(sureness) > _SURE and fraction > _SHARE
     return sure or (abs(sureness) > _OBVIOUSLY_SURE and fraction > _OBVIOUS)
 
 
 def _test_signal(fitted: LinearFit, candidate: _Signal) -> tuple[float, float, float]:
-    """Return the standard deviations from zero, the share of the residuals, and the coefficient of a signal."""
+    """Return the coefficient of a signal in the residuals: its value in standard deviations, the fraction of the
+    residuals that it explains, and the value itself.
+    """
     left = fitted.compute_residuals_of(candidate.signal)
     weights = fitted.weights
     size = sum(float(np.sum(u**2 * weights)) for u in left)
@@ -124,7 +126,7 @@ def _test_signal(fitted: LinearFit, candidate: _Signal) -> tuple[float, float, f
 
 
 def _add_column(fitted: LinearFit, signal: Sequence[FloatArray]) -> LinearFit:
-    """Return the fit with one more column."""
+    """Return the fit with one additional column."""
     rows = fitted.rows
     X = tuple(
         np.concatenate([x, u[..., None]], axis=2) for x, u in zip(rows.X, signal, strict=True)

@@ -39,7 +39,7 @@ _MOST_SHOWN = 12
 
 @dataclass(frozen=True)
 class Signals:
-    """An uninterrupted motion as recorded, in SI units, of joints; each (n_samples, n_dof)."""
+    """A recording of uninterrupted motion, in SI units of the joints; each array (n_samples, n_dof)."""
 
     time: FloatArray
     """(n_samples,)"""
@@ -51,7 +51,7 @@ class Signals:
     """Number of whole turns that were added to each position, empty where not known, (n_dof,)."""
 
     def slice_rows(self, rows: slice | BoolArray) -> "Signals":
-        """Return some samples."""
+        """Return the signals at some samples."""
         dz = None if self.dz is None else self.dz[rows]
         ddz = None if self.ddz is None else self.ddz[rows]
         return Signals(self.time[rows], self.z[rows], dz, ddz, self.tau[rows])
@@ -260,7 +260,7 @@ def resample_evenly(
 
     Args:
         signals: The recording.
-        steps: Rows with which a motion begins anew although no time is missing.
+        steps: Rows at which a new motion begins although no time is missing.
 
     Returns:
         The motions, samples per second, and what was done.

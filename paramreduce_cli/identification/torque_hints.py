@@ -26,7 +26,7 @@ _NEAR = 0.1
 
 
 def hint_at_unit(expected: FloatArray, ratios: FloatArray) -> list[str]:
-    """Return a hint if measured torques are the config's torques times a large factor.
+    """Return a hint if measured torques are the config's torques times a large factor, as with a wrong unit.
 
     Args:
         expected: Torques of the bodies with the values in the config, (n_samples, n_dof).
@@ -82,7 +82,7 @@ def hint_at_sign(
 
     Args:
         usual: Observation matrix, (n_samples, n_dof, n).
-        mirrored: The same with each joint's motion turned round in turn; or none.
+        mirrored: Observation matrices with the motion of one joint after the other reversed; may be empty.
         tau: (n_samples, n_dof)
         deviation: Standard deviations of the torques, (n_dof,).
         names: Names of the coordinates.
@@ -101,7 +101,7 @@ def hint_at_sign(
 
 
 def _compute_misfit(W: FloatArray, tau: FloatArray, deviation: FloatArray) -> float:
-    """Return the squared residuals of the best fit, over the deviations."""
+    """Return the sum of squared residuals of the best fit; residuals are divided by their standard deviations."""
     weighted = np.concatenate([W, tau[..., None]], axis=2) / deviation[:, None]
     rows: FloatArray = weighted.reshape(-1, weighted.shape[2])
     # A triangular factor first: rows are many, and columns depend on each other.
@@ -112,7 +112,7 @@ def _compute_misfit(W: FloatArray, tau: FloatArray, deviation: FloatArray) -> fl
 def hint_at_gravity(
     W: FloatArray, pulls: FloatArray, tau: FloatArray, deviation: FloatArray, gravity: FloatArray
 ) -> list[str]:
-    """Say where the residuals are far smaller with gravity along another axis of the base, or without gravity.
+    """Return a hint if residuals are far smaller with gravity along another axis of the base, or without gravity.
 
     Args:
         W: Observation matrix with the gravity of the config, (n_samples, n_dof, n).

@@ -25,7 +25,7 @@ _SETTLING = 1000
 
 @dataclass(frozen=True)
 class ColouredNoise:
-    """An autoregressive noise: e_k = sum_i coefficients_i e_{k-i} + white noise."""
+    """An autoregressive model of noise: e_k = sum_i coefficients_i e_{k-i} + white noise."""
 
     coefficients: FloatArray
     """(order,)"""
@@ -76,8 +76,8 @@ def fit_noise(autocovariance: FloatArray, n: int) -> ColouredNoise:
     """Return the autoregressive model of residuals, by the Yule-Walker equations [Stoica2005], Sec. 3.4.
 
     Args:
-        autocovariance: (n_lags,)
-        n: Samples that it is of.
+        autocovariance: Autocovariances, (n_lags,).
+        n: Number of samples that the autocovariances were estimated from.
     """
     if not autocovariance[0] > 0:
         return ColouredNoise(np.zeros(0), _NOTHING)

@@ -55,7 +55,7 @@ def find_leanest(
 
 
 def _list_tolerances(function: str, given: Tolerances) -> Tolerances:
-    """Return the tolerances of the errors that a function has, without infinite ones."""
+    """Return the finite tolerances of the errors that a function has."""
     kinds = ("torque_error", "acceleration_error")[: 2 if function == "direct" else 1]
     return {key: given[key] for key in kinds if np.isfinite(given.get(key, np.inf))}
 
@@ -88,7 +88,7 @@ def _iterate_models(function: str, limits: _Limits, results: Results) -> Iterato
 def _iterate_term_models(
     function: str, limits: _Limits, terms: TermReduction | None
 ) -> Iterator[Leanest]:
-    """Yield the function with terms removed, if there is one and it keeps to the limits."""
+    """Yield the function with pruned terms, if there is one and its errors are within the limits."""
     one = None if terms is None else terms.functions.get(function)
     if one is not None and all(
         getattr(one, key)[part] <= limit for (key, part), limit in limits.items()

@@ -70,7 +70,7 @@ def find_nearest_to(
 
 def find_best_of_size(results: Mapping[str, HeuristicValidation], n: int) -> Pick | None:
     """Return the model of n parameters with the smallest torque error on the estimation set, or None if no heuristic
-    has one. Among equals it is the last heuristic's.
+    has one; of equal models that of the last heuristic.
     """
     rows = {name: result.find_row(n) for name, result in results.items()}
     return _find_smallest(results, [(name, row) for name, row in rows.items() if row is not None])
@@ -79,8 +79,8 @@ def find_best_of_size(results: Mapping[str, HeuristicValidation], n: int) -> Pic
 def _find_smallest(
     results: Mapping[str, HeuristicValidation], picks: Sequence[Pick]
 ) -> Pick | None:
-    """Return the pick with the fewest parameters, of several the one with the smallest error on the validation set;
-    None if there are no picks.
+    """Return the pick with the fewest parameters, of several the one with the smallest torque error on the estimation
+    set; None if there are no picks.
     """
     if not picks:
         return None
@@ -90,7 +90,7 @@ def _find_smallest(
 
 
 def _find_best(results: Mapping[str, HeuristicValidation], picks: Sequence[Pick]) -> Pick:
-    """Return the model with the smallest torque error on the estimation set; among equals the last."""
+    """Return the pick with the smallest torque error on the estimation set; of equal picks the last."""
     errors = np.array([results[name].torque_error.estimation[row] for name, row in picks])
     return picks[int(np.flatnonzero(errors <= errors.min() * (1 + TIE) + EXACT)[-1])]
 
@@ -146,7 +146,8 @@ def list_models(results: Mapping[str, HeuristicValidation]) -> list[ModelChoice]
 def list_shown_models(
     results: Mapping[str, HeuristicValidation], selected: Selected, front: Sequence[ModelChoice]
 ) -> list[ModelChoice]:
-    """Return the models whose operations people look at; counting all models takes minutes for large robots.
+    """Return the models whose operations the page and the tables show; counting those of all models takes minutes for
+    large robots.
 
     Args:
         results: Validation of each heuristic.

@@ -49,7 +49,7 @@ class OperationCounts:
         return len(set(self._structures.values())) * self._model.values.size <= _FEW
 
     def estimate(self, heuristics: Heuristics) -> Heuristics:
-        """Return the validation of heuristics with operations that are nearly right for all models."""
+        """Return the validation of heuristics with approximate numbers of operations for all models."""
         counts = Counts(self._model, self._counted)
         kept = {key: one.standard != 0 for key, one in self._models.items()}
         found = {

@@ -31,7 +31,7 @@ def select_model(
     results: Mapping[str, HeuristicValidation],
     cross_validation: Mapping[str, CrossValidation] | None,
 ) -> Selected:
-    """Return the model of the size asked for, or the smallest one within the tolerances on both sets.
+    """Return the model of the size that the config asks for, or the smallest model within the tolerances on both sets.
 
     If no model keeps the tolerances it is the nearest one, with a note. With cross-validation it is the smallest model
     that the data cannot distinguish from the best.
@@ -123,7 +123,7 @@ def _explain_choice(
     heuristic: str,
     n: int,
 ) -> str:
-    """Return a sentence on the reason for the choice."""
+    """Return a sentence that says why the model was chosen."""
     who = f"{heuristic} with n = {n}"
     if set(tolerances) == {"operations"}:
         return f"{who} has the smallest torque error with {_format_tolerances(tolerances)}."

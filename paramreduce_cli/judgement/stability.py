@@ -22,12 +22,12 @@ def measure_stability(
     select: Callable[[SelectionProblem], IntArray],
     report_progress: ProgressCallback,
 ) -> Stability:
-    """Repeat the selection on other data.
+    """Repeat the selection on variants of the data, and return how the chosen parameters and the errors change.
 
     Args:
         problem: Selection problem, whose candidates, preference and groups stay.
         factors: Triangular factors of the weighted [W | chi], with the variant of the data.
-        select: Returns the subset for a problem.
+        select: Function that returns the subset for a problem.
         report_progress: Progress callback.
     """
     n = problem.W.shape[1]

@@ -95,7 +95,7 @@ def find_formulations(
         mechanism: Mechanism whose tree is formulated.
         affecting: Parameters that change the torques at all, (n_parameters,).
         base: Indices of the base parameters.
-        run: Workers, and an audience that is told how many of the six searches have ended.
+        run: Worker processes, and a progress callback that counts the searches that have ended.
 
     Returns:
         Choices for the inverse and for the direct dynamics, each different set once.
@@ -171,13 +171,13 @@ def _build(direct: bool) -> Build:
 def add_formulations(
     model: Model, subsets: Iterable[IntArray], *, direct: bool, jobs: int = 1
 ) -> Formulations:
-    """Return the formulations of a model, and more that suit some subsets of its parameters.
+    """Return the formulations of a model, and additional ones that are lean for some subsets of its parameters.
 
     Args:
         model: Model of the robot, with formulations.
-        subsets: Indices of the parameters that are not zero, of each.
-        direct: Whether they are for the direct dynamics, not for the inverse.
-        jobs: Processes.
+        subsets: Indices, for each subset, of the parameters that are not zero.
+        direct: Whether formulations of the direct dynamics are meant, not of the inverse.
+        jobs: Number of processes.
 
     Returns:
         Those of the model first, each different set once.
@@ -212,7 +212,8 @@ def vary_formulation(
     mechanism: Mechanism,
     rng: np.random.Generator,
 ) -> Formulation:
-    """Return a formulation with one or two random changes, or with the choices of another one at joints in a row.
+    """Return a formulation with one or two random changes, or with the choices of another formulation at several joints
+    in a row.
 
     Args:
         formulation: Formulation of the mechanism.

@@ -85,7 +85,7 @@ def add_rotation(
 
     Args:
         frame: Motion of the other frame, in its own components.
-        turn: Rotation between the frames now.
+        turn: Rotation between the two frames at this instant.
         speed: Speed of the joint, rad/s.
         acceleration: Acceleration of the joint, rad/s^2.
         diagonal: Way to compute the diagonal of U.
@@ -127,7 +127,7 @@ def add_rotation(
 
 @cache_expressions
 def change_components(turn: ConstantRotation, frame: FrameMotion) -> FrameMotion:
-    """Return the same motion in the components of another frame fixed in the first."""
+    """Return the same motion in the components of a frame that is fixed in the first."""
     if not turn.is_permutation:
         return make_frame_motion(turn.to_child(frame.omega), turn.to_child(frame.rate))
     axes = turn.find_permutation()

@@ -68,7 +68,7 @@ class Inertia:
         )
 
     def cycle_axes(self) -> Inertia:
-        """Return the inertia in renamed axes: x becomes z, y becomes x and z becomes y."""
+        """Return the inertia after renaming the axes: x becomes z, y becomes x and z becomes y."""
         x, y, z = self.d
         return Inertia(self.m, (y, z, x), self.yy, self.yz, self.xy, self.zz, self.xz, self.xx)
 

@@ -90,7 +90,9 @@ def build_torques(kinematics: Kinematics) -> list[Scalar]:
 def split_axial_part(
     body: Inertia, choice: JointFormulation, state: JointState
 ) -> tuple[Inertia, Inertia]:
-    """Split an inertia into the part that a hinge cannot tell from inertia of the parent body, and the rest."""
+    """Split an inertia into the part that has the same effect in the parent body, because the joint is a hinge, and the
+    rest.
+    """
     nothing = _make_zero_inertia(body)
     if not state.joint.revolute:
         return nothing, body
@@ -185,8 +187,8 @@ def transfer_inertia(
 
     Args:
         kinematics: Kinematics of the tree.
-        i: Number of the joint.
-        axial: Part that may as well belong to the parent body.
+        i: Index of the joint.
+        axial: Part that has the same effect in the parent body.
         handed: Inertia in the frame at rest.
         inertias: Inertias of all bodies, in their frames; changed in place.
         at_rest: Inertias of all bodies, in their frames at rest; changed in place.

@@ -65,7 +65,9 @@ OPTIONS: dict[str, tuple[Any, ...]] = {
 
 
 def list_alternatives(choice: JointFormulation, joint: Joint) -> list[JointFormulation]:
-    """List the choices that differ from a joint's choice in one thing, or in the place of several inertia parts.
+    """List the formulations of a joint that differ in one choice, or in the recursion step of several inertia parts.
+
+    Projections of wrenches are varied by :func:`list_distant_alternatives` instead.
 
     Whether wrenches are projected is for :func:`list_distant_alternatives` alone.
     """
@@ -85,7 +87,7 @@ def list_alternatives(choice: JointFormulation, joint: Joint) -> list[JointFormu
 
 
 def list_distant_alternatives(choice: JointFormulation, joint: Joint) -> list[JointFormulation]:
-    """List the alternatives that change every wrench that passes a joint, from however far."""
+    """List the alternatives that change all wrenches that pass through a joint from the bodies beyond it."""
     names = _list_alignment_fields(choice, joint) + ["projected"] * (joint.parent != BASE)
     return [replace(choice, **{name: not getattr(choice, name)}) for name in names]  # type: ignore[arg-type]
 
@@ -111,7 +113,7 @@ def to_data(choice: JointFormulation) -> dict[str, str | bool]:
 
 
 def from_data(data: Mapping[str, str | bool]) -> JointFormulation:
-    """Return the choice that plain values describe."""
+    """Return the formulation of a joint from plain values, as files hold it."""
     kinds = {
         "gauge": Gauge,
         "diagonal": Diagonal,

@@ -61,7 +61,7 @@ class Tree:
 
 
 def choose_frames(mechanism: Mechanism) -> Tree:
-    """Choose the frames of a mechanism's tree."""
+    """Choose the frames of a mechanism's bodies so that the recursion takes few operations."""
     joints: list[Joint] = []
     for i, body in enumerate(mechanism.bodies):
         before = None if body.parent == BASE else joints[body.parent]
@@ -104,7 +104,8 @@ def _has_tilt(rotation: FloatArray) -> bool:
 
 
 def _split_rotation_about_z(turn: FloatArray) -> tuple[FloatArray, float]:
-    """Split off the rotation about z that comes first, unless the whole is a permutation of axes.
+    """Split a rotation matrix into a rotation about z, applied first, and the rest; the angle is zero if the matrix is
+    a permutation of axes.
 
     Turns by quarters cost nothing where they are; others, about other axes, need fewer products
     without.

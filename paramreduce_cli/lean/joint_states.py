@@ -70,7 +70,7 @@ class Symbols:
         return Inertia(m, (x, y, z), *tensor)
 
     def read_parameter(self, position: int) -> Scalar:
-        """Return a parameter, zero where it is dropped."""
+        """Return a parameter, zero if it is dropped."""
         if position in self._dropped:
             return self.make_constant(0.0)
         return Scalar(self.graph, self.graph.input(position))
@@ -83,7 +83,7 @@ class Symbols:
 
 @dataclass(frozen=True)
 class Angle:
-    """An angle about z with its derivatives; constant parts are kept apart."""
+    """An angle about z and its derivatives; its constant part is kept apart."""
 
     sum: Scalar
     offset: float
@@ -160,7 +160,9 @@ class Kinematics:
             self.states.append(self._make_state(i))
 
     def sum_body_inertia(self, i: int) -> Inertia:
-        """Return the inertia of a body with its payloads in the frame on its joint."""
+        """Return the inertia of a body with its payloads, in the body's frame that ``choose_frames`` has put on the
+        joint's axis.
+        """
         joint = self.tree.joints[i]
         whole = self.symbols.make_zero_inertia()
         for rigid in joint.rigid:
@@ -171,7 +173,7 @@ class Kinematics:
         return whole
 
     def _make_state(self, i: int) -> JointState:
-        """Return the motion of the frames at joint i; the joints before have theirs."""
+        """Return the motion of the frames at joint i; the parent's must have been computed."""
         joint, choice = self.tree.joints[i], self.choices[i]
         before = None if joint.parent == BASE else self.states[joint.parent]
         fixed = make_constant_rotation(self.graph, joint.rotation.tobytes())
@@ -231,7 +233,7 @@ class Kinematics:
         return Angle(self._zero, 0.0, self._zero, self._zero)
 
     def find_screws(self, i: int) -> dict[int, tuple[Vector, Vector]]:
-        """Return how the joints before joint i move its origin.
+        """Return the motion of the origin of joint i that each joint before it causes.
 
         Returns:
             Angular velocity and velocity of the origin for a unit speed of each joint,

@@ -100,7 +100,7 @@ class LeanFunctions:
     def _build_lean_outputs(
         self, model: Callable[..., Program], project: Callable[..., list[int]]
     ) -> tuple[Graph, list[int]]:
-        """Return the outputs of a lean model in a graph whose parameters are numbered like those that are kept."""
+        """Return the outputs of a lean model in a graph whose inputs are the kept parameters, then q, dq and ddq."""
         if self._simplified is not None:
             program = self._build_pruned_program(self._simplified, project)
         else:
@@ -117,7 +117,7 @@ class LeanFunctions:
     def _build_pruned_program(
         self, simplified: TermModel, project: Callable[..., list[int]]
     ) -> Program:
-        """Return a pruned program with inputs like those of lean models, for the independent coordinates."""
+        """Return a pruned program, for the independent coordinates, with the same order of inputs as lean models have."""
         start, n = self._models.n_parameters, simplified.values.size
         first = [int(np.flatnonzero(simplified.position == k)[0]) for k in range(n)]
         graph = Graph()
@@ -140,7 +140,7 @@ class LeanFunctions:
     def _make_function(
         self, name: str, text: str, results: tuple[Argument, ...], graph: Graph, outputs: list[int]
     ) -> Function:
-        """Return a function without the arguments that its kind never needs."""
+        """Return a function without the arguments that functions of its kind never need."""
         needed = {
             "inverse_dynamics": {"phi", "q", "dq", "ddq", "R"},
             "direct_dynamics": {"phi", "q", "dq", "R", "b"},

@@ -27,7 +27,7 @@ _NEAR = 1.02
 
 @dataclass
 class _Variants:
-    """The same model in all formulations."""
+    """The programs of one model in all formulations."""
 
     programs: list[Program]
 
@@ -39,11 +39,11 @@ class _Variants:
         return [LiveCount(program) for program in self.programs]
 
     def estimate_operations(self, zero: BoolArray) -> list[int]:
-        """Return the approximate operations of each formulation with some parameters zero."""
+        """Return about how many operations each formulation takes with some parameters zero."""
         return [count(zero) for count in self._counts]
 
     def select_promising(self, zero: BoolArray) -> list[int]:
-        """Return the numbers of the formulations that may turn out to be the leanest."""
+        """Return the indices of the formulations that may turn out to be the leanest."""
         estimates = self.estimate_operations(zero)
         most = _NEAR * min(estimates)
         return [k for k, count in enumerate(estimates) if count <= most]
@@ -157,7 +157,7 @@ class LeanModels:
         return self._build_leanest(self._direct, model, constant, rewritten)
 
     def choose_formulation(self, model: ReducedModel, *, direct: bool = False) -> Formulation:
-        """Return the formulation with the fewest operations before rewriting."""
+        """Return the formulation that takes the fewest operations for a model, before rewriting."""
         variants = self._direct if direct else self._inverse
         _, number = self._choose_simplified(variants, model, constant=False)
         return self.get_formulations(direct=direct)[number]
@@ -214,7 +214,7 @@ class LeanModels:
     def _choose_simplified(
         self, variants: _Variants, model: ReducedModel, constant: bool
     ) -> tuple[Values, int]:
-        """Return the values of the leanest formulation before rewriting, and its number."""
+        """Return the values of the leanest formulation before rewriting, and the index of the formulation."""
         specialised = self._specialise_promising(variants, model, constant)
         settled = [(values.simplify(), number) for number, values in specialised.items()]
         return min(settled, key=lambda entry: entry[0].n_operations)
@@ -222,12 +222,16 @@ class LeanModels:
     def _specialise_promising(
         self, variants: _Variants, model: ReducedModel, constant: bool
     ) -> dict[int, Values]:
-        """Return the formulations that may turn out to be the leanest, by number."""
+        """Return the values of each formulation that may turn out to be the leanest for a model, by the formulation's
+        index.
+        """
         numbers = variants.select_promising(self._mark_dropped(model.kept))
         return {k: self._specialise_program(variants.programs[k], model, constant) for k in numbers}
 
     def _specialise_program(self, program: Program, model: ReducedModel, constant: bool) -> Values:
-        """Return a formulation for a model, without the parameters that the model drops."""
+        """Return the values of a program in which the parameters that a model drops are zero, and tied ones are one
+        input.
+        """
         ties, values = model.ties, model.standard
         kept = frozenset(model.kept.tolist())
         graph = Graph()

@@ -25,11 +25,11 @@ def check_formulations(
     states: tuple[FloatArray, FloatArray, FloatArray],
     rng: np.random.Generator,
 ) -> None:
-    """Compare every formulation with textbook recursion on the open tree.
+    """Compare every formulation with textbook recursion on the open tree; raise FormulationError if one differs.
 
     Args:
         mechanism: The mechanism.
-        formulations: Formulations to be checked, one by one.
+        formulations: Formulations to be checked.
         kept: Indices of parameters that are not zero; they get random values.
         states: q, dq, ddq, each (n_samples, n_q).
         rng: Random generator.
@@ -64,13 +64,13 @@ def check_formulations(
 def reject_if_wrong(
     what: str, off: FloatArray, against: FloatArray, tolerance: float = TOLERANCE
 ) -> None:
-    """Refuse results that are too far from those of textbook recursion.
+    """Raise FormulationError if results are too far from those of textbook recursion.
 
     Args:
         what: Source of the results, for the message.
-        off: Their differences.
-        against: Size that the largest difference is compared with.
-        tolerance: Share of the largest value that is allowed.
+        off: Differences from textbook recursion.
+        against: Magnitude that the largest difference is divided by.
+        tolerance: Largest ratio that is allowed.
 
     Raises:
         FormulationError: They are too far off.

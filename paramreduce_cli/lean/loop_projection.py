@@ -45,7 +45,7 @@ def project_direct_outputs(mechanism: Mechanism, graph: Graph, outputs: Sequence
 
 
 def _read_tangent(mechanism: Mechanism, graph: Graph) -> tuple[list[list[Scalar]], list[Scalar]]:
-    """Return R, (n_q, n_dof), and b, (n_q,), as inputs of a graph."""
+    """Return R and b of dq = R dz, ddq = R ddz + b as inputs of a graph: R, (n_q, n_dof), and b, (n_q,)."""
     n_z, dependent = mechanism.n_dof, mechanism.dependent
     zero, one = Scalar(graph, graph.constant(0.0)), Scalar(graph, graph.constant(1.0))
     R = [[zero] * n_z for _ in range(mechanism.n_q)]

@@ -23,18 +23,18 @@ class JointRotation:
     sine: Scalar
 
     def to_parent(self, a: Vector) -> Vector:
-        """Return Rz a, from components in the rotated frame to those before the rotation."""
+        """Return a vector's components before the rotation, Rz a, from those in the rotated frame."""
         c, s = self.cosine, self.sine
         return (c * a[0] - s * a[1], s * a[0] + c * a[1], a[2])
 
     def to_child(self, a: Vector) -> Vector:
-        """Return Rz' a, from components before the rotation to those in the rotated frame."""
+        """Return a vector's components in the rotated frame, Rz' a, from those before the rotation."""
         c, s = self.cosine, self.sine
         return (c * a[0] + s * a[1], c * a[1] - s * a[0], a[2])
 
     @cache_expressions
     def rotate_inertia(self, body: Inertia) -> Inertia:
-        """Return Rz I Rz', with the first moments.
+        """Return the inertia in the frame before the rotation: Rz I Rz' and the rotated first moments.
 
         The xx-yy-xy block turns by the double angle; with w = s (Ixx - Iyy) + 2 c Ixy it loses
         s w in xx, gains it in yy, and xy becomes c w - Ixy.

@@ -64,13 +64,13 @@ class Wrench:
 
 @cache_expressions
 def compute_inertial_wrench(body: Inertia, frame: FrameMotion, a: Vector, gauge: Gauge) -> Wrench:
-    """Return the wrench that a body needs to move with a frame.
+    """Return the force and the moment, about the frame's origin, that move a body with a frame.
 
     Args:
         body: Inertia in the frame, about its origin.
         frame: Motion of the frame.
         a: Acceleration of its origin, less gravity.
-        gauge: Gauge of the body's inertia; gives the cheapest form of the moment.
+        gauge: Part of the body's inertia that is handed to the parent body; with it the moment takes fewest operations.
     """
     force = add(frame.multiply(body.d), scale(body.m, a))
     return Wrench(force, add(_compute_spin_moment(body, frame, gauge), cross(body.d, a)))
@@ -90,7 +90,7 @@ def _compute_spin_moment(body: Inertia, frame: FrameMotion, gauge: Gauge) -> Vec
 
 
 def _compute_diagonal_spin_moment(body: Inertia, frame: FrameMotion, gauge: Gauge) -> Vector:
-    """Return the part of the spin moment that the diagonal of the inertia tensor needs."""
+    """Return the part of the spin moment that comes from the diagonal of the inertia tensor."""
     U, (rx, ry, rz), (yz, xz, xy) = frame.U, frame.rate, frame.products
     xx, yy, zz = body.xx, body.yy, body.zz
     if gauge is Gauge.FLAT:
@@ -104,7 +104,7 @@ def _compute_diagonal_spin_moment(body: Inertia, frame: FrameMotion, gauge: Gaug
 
 @cache_expressions
 def compute_moment_about_z(body: Inertia, frame: FrameMotion, a: Vector) -> Scalar:
-    """Return the moment about z that a body needs to move with a frame."""
+    """Return the moment about z that moves a body with a frame."""
     U, d = frame.U, body.d
     return (
         body.zz * frame.rate[2]
@@ -123,7 +123,7 @@ def compute_force_along_z(body: Inertia, frame: FrameMotion, a: Vector) -> Scala
 
 @cache_expressions
 def compute_rotation_wrench(body: Inertia, turning: RotationEffect) -> Wrench:
-    """Return the wrench that a rotation about z adds to what a body needs.
+    """Return the additional wrench that a body needs because its frame rotates about z.
 
     With C = U_after - U_before and S the second moments, it is C d and the skew part of C S, of
     which C leaves little: twice S_xx is Izz - (Ixx - Iyy), twice S_yy is Izz + (Ixx - Iyy), and

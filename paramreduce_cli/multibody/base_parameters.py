@@ -28,7 +28,7 @@ _LENGTHS = {Kind.M: 2, Kind.MX: 1, Kind.MY: 1, Kind.MZ: 1}
 
 
 def find_affecting_columns(W: FloatArray) -> BoolArray:
-    """Find the columns that are not zero to rounding beside the longest one, (n,)."""
+    """Find the columns that are not zero to rounding, relative to the longest one, (n,)."""
     norms = np.linalg.norm(W, axis=0)
     largest = norms.max(initial=0.0)
     result: BoolArray = norms > _AFFECTING_TOLERANCE * largest
@@ -68,12 +68,12 @@ def find_affecting_parameters(mechanism: Mechanism, K: FloatArray) -> BoolArray:
 def choose_base(
     W: FloatArray, preference: IntArray, tolerance: float, affects: BoolArray | None = None
 ) -> BaseParameters:
-    """Choose independent columns greedily and express the others in them.
+    """Choose independent columns greedily, in order of preference, and express the others in them.
 
     Args:
         W: Observation matrix of random states, (n_rows, n).
-        preference: All column indices, the most wanted first.
-        tolerance: Singular values below this share of the largest one count as zero.
+        preference: All column indices, the most preferred first.
+        tolerance: Singular values below this fraction of the largest one count as zero.
         affects: Whether each column has an effect, (n,); decided beside the longest column if left out.
 
     Returns:

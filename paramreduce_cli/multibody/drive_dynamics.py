@@ -55,12 +55,12 @@ def _express_friction_sign(drive: Drive, states: Sequence[Sequence[Any]], odd: O
 
 
 def smooth_friction(mechanism: Mechanism, speeds: FloatArray) -> Mechanism:
-    """Return the mechanism with a smooth sign in Coulomb friction, so that gradients exist; without such friction the
-    mechanism itself.
+    """Return the mechanism with a smooth sign in Coulomb friction, so that gradients exist; a mechanism without such
+    friction is returned as it is.
 
     Args:
         mechanism: The mechanism.
-        speeds: Largest ones of the independent coordinates, (n_dof,), rad/s or m/s.
+        speeds: Largest speeds of the independent coordinates, (n_dof,), rad/s or m/s.
     """
     if all(parameter.kind is not Kind.COULOMB for parameter in mechanism.parameters):
         return mechanism

@@ -131,7 +131,7 @@ class Dynamics:
         return BatchFunction([q, dq], [R.T, b], once=self._once)
 
     def make_observation(self, columns: IntArray) -> ObservationFunction:
-        """Return the function that gives columns of W along a trajectory, and its adjoint."""
+        """Return the function that computes some columns of W along a trajectory, and its adjoint."""
         tree = express_regressor(self.mechanism, columns.tolist())
         loop = self._loop
         if loop is None:
@@ -164,7 +164,7 @@ class ObservationFunction:
 
         Args:
             q: Generalised coordinates, (n_samples, n_q).
-            dz: Velocities of the independent ones, (n_samples, n_dof).
+            dz: Velocities of the independent coordinates, (n_samples, n_dof).
             ddz: Accelerations, same shape.
         """
         (K,) = self._forward(q, dz, ddz)
@@ -173,13 +173,14 @@ class ObservationFunction:
     def compute_vector_jacobian_product(
         self, q: FloatArray, dz: FloatArray, ddz: FloatArray, W_bar: FloatArray
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return the derivative with respect to the independent coordinates from that with respect to W.
+        """Return the derivative of a function with respect to the independent coordinates, given its derivative with
+        respect to W. The closure equations relate the derivatives: dq/dz = R.
 
         The derivative by z is taken through the position problem: dq/dz = R.
 
         Args:
             q: Generalised coordinates, (n_samples, n_q).
-            dz: Velocities of the independent ones, (n_samples, n_dof).
+            dz: Velocities of the independent coordinates, (n_samples, n_dof).
             ddz: Accelerations, same shape.
             W_bar: Derivative of a scalar with respect to W, (n_samples * n_dof, n_columns).
 

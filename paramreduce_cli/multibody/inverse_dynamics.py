@@ -98,7 +98,7 @@ def _propagate_rates(
 
 
 def _express_inertial_wrench(rigid: Rigid, phi: ca.SX, rates: FrameRates) -> tuple[Vector, Vector]:
-    """Return force and moment about the origin of the carrying body that keep a rigid part on its motion."""
+    """Return the force and the moment, about the origin of the carrying body, that a rigid part needs for its motion."""
     rotation, place = rigid.frame[:3, :3], rigid.frame[:3, 3].tolist()
     to_body = rotation.T.tolist()
     own = FrameRates(
@@ -112,7 +112,9 @@ def _express_inertial_wrench(rigid: Rigid, phi: ca.SX, rates: FrameRates) -> tup
 
 
 def _express_body_wrench(rigid: Rigid, phi: ca.SX, rates: FrameRates) -> tuple[Vector, Vector]:
-    """Return force and moment about the origin of the part's own frame, in that frame."""
+    """Return the force and the moment, about the origin of the part's own frame and in that frame, that a rigid part
+    needs for its motion.
+    """
     values = [phi[column] for column in (rigid.columns[kind] for kind in INERTIAL)]
     m, d, (xx, xy, xz, yy, yz, zz) = values[0], values[1:4], values[4:]
     tensor: Matrix = ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))

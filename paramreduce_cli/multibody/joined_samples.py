@@ -8,7 +8,7 @@ from paramreduce_cli.records import Block, FloatArray, SampleSet
 
 
 class StoredStates(SampleSet, Protocol):
-    """A stored set that gives its states alone too."""
+    """A stored set whose states can be read without W."""
 
     @property
     def first(self) -> int:
@@ -19,7 +19,7 @@ class StoredStates(SampleSet, Protocol):
 
 
 class JoinedSet:
-    """A sample set of consecutive parts.
+    """A sample set that joins consecutive parts.
 
     Args:
         parts: Parts in their order.

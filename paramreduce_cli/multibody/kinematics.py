@@ -46,7 +46,9 @@ class JointMotion:
         return (ca.SX(x), ca.SX(y), ca.SX(z))
 
     def get_arm(self) -> Vector:
-        """Return the vector from a fixed point of the joint's axis to the body's origin, in the body's frame, m."""
+        """Return the vector from a point of the joint's axis that is fixed in the parent to the body's origin, in the
+        body's frame, m.
+        """
         offset = self.body.joint_to_body[:3, :3].T @ self.body.joint_to_body[:3, 3]
         return (ca.SX(offset[0]), ca.SX(offset[1]), ca.SX(offset[2]))
 
@@ -87,9 +89,9 @@ def transform_point(joints: list[JointMotion], body: int, point: FloatArray) -> 
     """Return the position in the base frame of a point given in the frame of a body, m.
 
     Args:
-        joints: One motion per body of the mechanism.
+        joints: Motions of the joints, one for each body of the mechanism.
         body: Index of the body, :data:`BASE` for the base.
-        point: (3,), m
+        point: Position in the body's frame, (3,), m.
     """
     x, y, z = np.asarray(point).tolist()
     position: Vector = (ca.SX(x), ca.SX(y), ca.SX(z))
@@ -113,7 +115,7 @@ def compute_body_poses(mechanism: Mechanism, q: FloatArray) -> FloatArray:
     """Return the poses of the body frames in the base frame.
 
     Args:
-        mechanism: Whose bodies are placed.
+        mechanism: Mechanism with the bodies.
         q: Generalised coordinates of one state, (n_q,), rad or m.
 
     Returns:

@@ -132,7 +132,9 @@ class ObservedSet:
     def _follow(
         self, s: StateBlock, before: tuple[FloatArray, FloatArray]
     ) -> tuple[FloatArray, tuple[FloatArray, FloatArray]]:
-        """Return the generalised coordinates of a block, and time and position of its end, to continue from there."""
+        """Return the generalised coordinates of a block, and the time and position at its end, at which the next block
+        starts.
+        """
         if self.dynamics.mechanism.loops is None:
             return s.z, before
         positions = s.z if s.fine_positions is None else s.fine_positions
@@ -150,7 +152,7 @@ class ObservedSet:
 
 
 class FactorAccumulator:
-    """An accumulator of the triangular factors of blocks."""
+    """An accumulator of the triangular factors of blocks, by trajectory and joint."""
 
     def __init__(self) -> None:
         self._factors: dict[int, list[FloatArray]] = {}
@@ -165,7 +167,7 @@ class FactorAccumulator:
             self._factorise()
 
     def _factorise(self) -> None:
-        """Compress the waiting rows into the factors."""
+        """Compress the collected rows into the factors."""
         first = self._waiting[0]
         n_dof, n = first.tau.shape[1], first.W.shape[1]
         factors = self._factors.setdefault(first.trajectory, [np.zeros((0, n + 1))] * n_dof)
@@ -211,7 +213,7 @@ def compute_joint_factors(blocks: Iterable[Block]) -> FloatArray:
 
 
 def join_factors(parts: Iterable[tuple[int, FloatArray]]) -> FloatArray:
-    """Return the triangular factors of all rows, from those of parts of the rows.
+    """Return the triangular factors of all rows, given those of parts of the rows.
 
     Args:
         parts: Consecutive parts of the samples: number of the first trajectory, and the factors from it on, (n_trajectories, n_dof, k, k).
@@ -260,11 +262,11 @@ def _make_square(factor: FloatArray) -> FloatArray:
 
 
 def combine_factors(factors: FloatArray, nominal_torque: FloatArray | None) -> FloatArray:
-    """Return the triangular factor of all rows together, each joint's divided by its nominal torque.
+    """Return the triangular factor of all rows together; the rows of each joint are divided by its nominal torque.
 
     Args:
-        factors: Per trajectory and joint, (n_trajectories, n_dof, k, k).
-        nominal_torque: (n_dof,), or None for no weighting.
+        factors: Factors by trajectory and joint, (n_trajectories, n_dof, k, k).
+        nominal_torque: Divisors, (n_dof,), or None for no weighting.
 
     Returns:
         (k, k)

@@ -11,7 +11,7 @@ DEPENDENT = 1e-9
 
 
 class Orthogonaliser:
-    """A set of unit columns and a vector, without their components along the columns taken.
+    """A set of unit columns and a vector, from which the components along chosen columns are removed.
 
     Modified Gram-Schmidt: a column that is taken is orthogonalised once more, and its direction is
     removed from all others.
@@ -40,7 +40,9 @@ class Orthogonaliser:
         return squared
 
     def take(self, column: int) -> bool:
-        """Take a column's direction out of all; whether there was one."""
+        """Remove the direction of a column from all columns; return whether the column was independent of those taken
+        before.
+        """
         direction = self.X[:, column].copy()
         self.X[:, column] = 0.0
         length = sqrt(direction @ direction)
@@ -66,13 +68,13 @@ def normalise_columns(W: FloatArray) -> tuple[FloatArray, FloatArray]:
 def select_independent(
     W: FloatArray, preferred: IntArray, dependent: float = DEPENDENT
 ) -> list[int]:
-    """Take columns in the order wanted, leaving out those that depend on columns taken before.
+    """Choose columns in order of preference; skip those that depend on columns chosen before.
 
     Args:
-        W: (k, n)
-        preferred: Column indices.
-        dependent: A column depends on others when no more than this share of its length is
-            left of it.
+        W: Matrix, (k, n).
+        preferred: Column indices, the most preferred first.
+        dependent: Fraction of a column's length: a column depends on others if no more than this is left after
+            projection.
     """
     rest = Orthogonaliser(normalise_columns(W[:, preferred])[0], dependent=dependent)
     return [int(column) for j, column in enumerate(preferred) if rest.take(j)]

@@ -19,7 +19,7 @@ def add_progress(
 
 @dataclass(frozen=True)
 class ProgressSet:
-    """A sample set whose samples are computed as they are read, with an audience."""
+    """A sample set whose samples are computed as they are read, with a progress callback."""
 
     computed: SampleSet
     what: str

@@ -66,7 +66,7 @@ class Quantities:
 
     @cached_property
     def _symbols(self) -> tuple[ca.MX, list[ca.MX]]:
-        """Coordinates and one smooth measure for each constraint."""
+        """Symbols of the coordinates, and one smooth expression for each constraint."""
         q = ca.SX.sym("q", self.mechanism.n_q)
         joints = make_joint_motions(self.mechanism, q)
         inner = ca.Function(
@@ -135,8 +135,8 @@ def _express_measure(joints: list[JointMotion], q: ca.SX, constraint: Constraint
 
 
 def _express_nearest(joints: list[JointMotion], constraint: Constraint) -> ca.SX:
-    """Return a smooth minimum over pairs of spheres of their squared distances, scaled to 1 where they just keep the
-    gap.
+    """Return a smooth minimum over pairs of spheres of their squared distances, scaled to 1 where the distance is just
+    allowed.
     """
     (a, b), (points_a, radii_a, points_b, radii_b) = constraint.bodies, constraint.vectors
     ends_a, ends_b = (

@@ -28,7 +28,7 @@ def express_regressor(mechanism: Mechanism, columns: Sequence[int] | None = None
 
     Args:
         mechanism: The tree; its loops are left open.
-        columns: Indices of the parameters that are asked for; all if left out.
+        columns: Indices of the requested parameters; all by default.
 
     Returns:
         A function of q, dq and ddq, each (n_q,), whose value is K', (n_columns, n_q), with
@@ -71,7 +71,7 @@ def _express_drive_rows(mechanism: Mechanism, q: ca.MX, dq: ca.MX, ddq: ca.MX) -
 
 
 def _move_frame(state: _FrameState, frame: FloatArray) -> _FrameState:
-    """Return the state of a frame that is fixed in another one."""
+    """Return the state of a frame that is fixed in another frame."""
     if np.array_equal(frame, np.eye(4)):
         return state
     R, p, omega, omega_dot, a = symbols = _make_frame_symbols()
@@ -120,7 +120,7 @@ def _make_frame_symbols() -> list[ca.SX]:
 
 
 def _make_joint_step(body: Body) -> ca.Function:
-    """Return the function from the state of the frame before to that of a body's frame, and the screw between."""
+    """Return the function from the state of the parent's frame to that of a body's frame, and the joint's screw."""
     R, p, omega, omega_dot, a = before = _make_frame_symbols()
     q, dq, ddq = (ca.SX.sym(name) for name in ("q", "dq", "ddq"))
     at_joint, to_body = body.parent_to_joint, body.joint_to_body

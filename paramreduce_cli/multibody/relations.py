@@ -50,15 +50,16 @@ def _list_square_sums(lengths: Sequence[tuple[str, float]]) -> dict[str, float]:
 
 
 def name_coefficient(values: FloatArray, texts: Sequence[str], functions: FloatArray) -> str | None:
-    """Return the text of the function of the geometry that a coefficient is, with its sign, or None.
+    """Return the text of the function of the geometry that gives a coefficient, with its sign; None if none or several
+    do.
 
     Args:
         values: The coefficient for each of several geometries, (n_geometries,).
         texts: Texts of the functions that the coefficient may be.
-        functions: :func:`candidates` of the same geometries, (n_geometries, n_functions).
+        functions: Values of these functions for the same geometries, (n_geometries, n_functions).
 
     Returns:
-        Such as ``- a_3^2``; None where no function fits all geometries, or more than one does.
+        Text such as ``- a_3^2``; None if no function fits all geometries, or more than one does.
     """
     missed = np.abs(functions - np.array([1.0, -1.0])[:, None, None] * values[:, None])
     fits = np.argwhere((missed <= _MATCH * np.abs(functions)).all(axis=1))
@@ -71,7 +72,8 @@ def name_coefficient(values: FloatArray, texts: Sequence[str], functions: FloatA
 def format_regrouping(
     names: Sequence[str], kept: IntArray, beta: Sequence[FloatArray], lengths: Sequence[Lengths]
 ) -> list[str]:
-    """Return the base parameters in terms of standard ones, with coefficients named if the geometry explains them.
+    """Return the base parameters as sums of standard ones; coefficients are written as products of link lengths where
+    the geometry explains them, else as numbers.
 
     Args:
         names: Names of all parameters, (n,).
@@ -92,7 +94,9 @@ def format_regrouping(
 def approximate_expressions(
     names: Sequence[str], kept: IntArray, beta: FloatArray, known_values: FloatArray | None = None
 ) -> list[str]:
-    """Approximate base parameters in terms of standard ones, with plain numbers.
+    """Return the approximate base parameters as sums of standard ones with numeric coefficients.
+
+    The terms with the largest share of the value come first; the text states only the number of the smallest ones.
 
     All terms of one stand before the same column of the observation matrix, so that their shares of the
     value are their shares of the torque: the largest come first, and the smallest are counted.
@@ -120,7 +124,7 @@ def approximate_expressions(
 
 
 def _format_sum(terms: Sequence[str], coefficients: FloatArray, first: str) -> str:
-    """Return a sum with its largest terms first, whose smallest terms are only counted.
+    """Return a sum with its largest terms first; of the smallest terms only the number is given.
 
     Args:
         terms: Terms with their signs.

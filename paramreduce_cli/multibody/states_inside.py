@@ -93,7 +93,7 @@ class StatesInside:
         return np.asarray(inside & (self._quantities.compute_rows(q) <= 0).all(axis=1))
 
     def _walk(self, count: int, rng: np.random.Generator) -> FloatArray:
-        """Return positions of loops that were reached, (count, n_q)."""
+        """Return random positions of loops, reached by moves from known positions, (count, n_q)."""
         lower, upper = self._lower[0, self._independent], self._upper[0, self._independent]
         q = self._known[rng.integers(len(self._known), size=count)]
         for _ in range(_MOVES):
@@ -107,8 +107,12 @@ class StatesInside:
         return q[self._are_inside(q)]
 
     def _shorten(self, q: FloatArray, drawn: FloatArray) -> States:
-        """Return states at positions q of loops, with velocities and accelerations as drawn, (n_samples, 3, n_dof), or
-        shorter.
+        """Return states of loops at positions q, whose velocities and accelerations are those drawn, reduced where a
+        dependent coordinate would exceed a limit.
+
+        Args:
+            q: Positions, (n_samples, n_q).
+            drawn: Independent positions, velocities and accelerations, (n_samples, 3, n_dof).
         """
         rates, (_, dz, ddz) = self._coordinates.compute_rates, np.moveaxis(drawn, 1, 0)
         still = np.zeros_like(dz)
@@ -123,7 +127,9 @@ class StatesInside:
 
 
 def _compute_ratios(rates: FloatArray, lower: FloatArray, upper: FloatArray) -> FloatArray:
-    """Return the shares of rates, (n_samples, n_q), that are inside limits around zero, one at most, (n_samples, 1)."""
+    """Return the largest fraction, at most one, of all rates of a sample that is inside limits around zero, (n_samples,
+    1).
+    """
     bound = np.where(rates > 0, upper, lower)
     shares = np.divide(bound, rates, out=np.ones_like(rates), where=rates != 0)
     return np.asarray(np.clip(shares, 0.0, 1.0).min(axis=1, keepdims=True))

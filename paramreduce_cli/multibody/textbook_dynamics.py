@@ -55,7 +55,9 @@ class PlainDynamics:
     def _make_programs(
         self, loop: list[ca.SX], tau: ca.SX, M: ca.SX, delta: ca.SX
     ) -> tuple[Program, Program]:
-        """Return the programs of IDM and of [M | delta] with M's lower triangle; phi comes first among the inputs."""
+        """Return the programs of the inverse dynamics and of [M | delta] with M's lower triangle; phi is the first
+        input.
+        """
         lower = [M[i, j] for i in range(M.shape[0]) for j in range(i + 1)]
         q, dq, ddq = self._q, self._dq, self._ddq
         inverse = ca.Function("d", [self._phi, q, dq, ddq, *loop], [tau])

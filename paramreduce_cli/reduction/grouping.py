@@ -23,7 +23,7 @@ class Group:
 
 @dataclass(frozen=True)
 class GroupedColumns:
-    """The columns among which is chosen, the most wanted of them, and which go together."""
+    """The columns to select from, their order of preference, and which of them belong together."""
 
     columns: Columns
     preference: IntArray
@@ -37,9 +37,9 @@ def group_columns(names: Sequence[str], ranks: IntArray, groups: Sequence[Group]
 
     Args:
         names: Names of the standard parameters, (n_standard,).
-        ranks: Their ranks of preference, (n_standard,); a tied group has that of its members
-            where they agree, and comes last where not.
-        groups: Subset with members among them, each in one group at most.
+        ranks: Ranks of preference, (n_standard,). A tied group has the rank of its members if they agree, otherwise it
+            comes last.
+        groups: Groups with members among these names; no name is in two groups.
     """
     tied = {member: group for group in groups if group.tied for member in group.members}
     labels = list(dict.fromkeys(tied[n].name if n in tied else n for n in names))

@@ -28,7 +28,7 @@ def list_choices(reduction: Reduction) -> list[str]:
 
 
 def make_full_model(model: Model) -> ReducedModel:
-    """Return the model with all parameters that change the torques."""
+    """Return the model that keeps every standard parameter with an effect on the torques."""
     kept = np.flatnonzero(model.affecting)
     return _make_model(model, kept, model.values[kept])
 
@@ -39,9 +39,10 @@ def make_base_model(model: Model) -> ReducedModel:
 
 
 def find_closest_standard(model: Model, chosen: ReducedModel) -> FloatArray:
-    """Return standard parameters that make the same model: of all that have its base parameters, those closest to the
-    robot's own, measured by the size of each body. Parameters of drives stay what they are as far as bodies can make up
-    for them.
+    """Return the standard parameters closest to the robot's own among all that give the same torques as a model.
+
+    Distances are divided by the size of each body; parameters of drives change only where bodies cannot give the same
+    effect.
 
     Args:
         model: Model of the robot.
@@ -61,7 +62,7 @@ def find_closest_standard(model: Model, chosen: ReducedModel) -> FloatArray:
 
 
 def _compute_scales(model: Model) -> FloatArray:
-    """Return the size of a large change of each parameter, (n_parameters,)."""
+    """Return the magnitude of a large change of each parameter, (n_parameters,), which distances are divided by."""
     sizes = _STIFF * (np.abs(model.values) + 1.0)
     for rigid in model.mechanism.rigid:
         values = {kind: abs(float(model.values[column])) for kind, column in rigid.columns.items()}
@@ -76,7 +77,7 @@ def _compute_scales(model: Model) -> FloatArray:
 def _make_model(
     model: Model, kept: IntArray, values: FloatArray, expressions: tuple[str, ...] = ()
 ) -> ReducedModel:
-    """Return a model that keeps some standard parameters, each its own expression unless expressions are given."""
+    """Return a model that keeps some standard parameters; expressions are their names by default."""
     names = model.mechanism.parameter_names
     chosen = Columns(names, np.arange(len(names))).make_model(kept, values)
     return replace(chosen, expressions=expressions or chosen.names)

@@ -15,7 +15,7 @@ def compute_residual_rms(factors: FloatArray, parameters: FloatArray, n_samples:
 
     Args:
         factors: Triangular factors of [W | tau] per trajectory and joint.
-        parameters: (n,)
+        parameters: Parameters of the model, (n,).
         n_samples: Number of samples in all trajectories.
     """
     left = factors[..., -1] - factors[..., :-1] @ parameters

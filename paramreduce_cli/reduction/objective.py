@@ -19,7 +19,7 @@ Subset = tuple[int, ...]
 
 
 class Objective(ABC):
-    """A criterion on one estimation set.
+    """A base class of criteria, on one estimation set.
 
     Args:
         problem: The weighted least-squares problem that torques are fitted with.

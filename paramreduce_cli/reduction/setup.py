@@ -53,19 +53,21 @@ _ROUND_OFF = 1e-15
 
 
 def _compute_lengths(W: FloatArray) -> FloatArray:
-    """Return the largest magnitude in each column, whose square need not be a number."""
+    """Return the largest magnitude in each column, a measure of length that cannot overflow."""
     lengths: FloatArray = np.abs(W).max(axis=0)
     return lengths
 
 
 def _find_affecting(W: FloatArray, values: FloatArray | None) -> BoolArray:
-    """Return which columns have an effect, (n,), also by what each contributes if its value is known."""
+    """Return which columns have an effect, (n,): those that are not short, or that contribute to the torques if values
+    are known.
+    """
     affecting = find_affecting_columns(W)
     return affecting if values is None else affecting | find_affecting_columns(W * values)
 
 
 def _warn_of_small_columns(W: FloatArray, affecting: BoolArray, names: tuple[str, ...]) -> None:
-    """Warn of columns that count as zero beside much longer ones."""
+    """Warn about columns that count as zero because others are much longer."""
     lengths = _compute_lengths(W)
     small = np.flatnonzero((lengths > 0) & ~affecting)
     if small.size:

@@ -16,7 +16,7 @@ from paramreduce_cli.reduction.objective import Objective, Subset
 
 @dataclass(frozen=True)
 class Effort:
-    """The effort of a search: kicks, time, nodes and threads."""
+    """The effort of a search: numbers of kicks and nodes, time, and threads."""
 
     kicks: int = 8
     """Random changes of a subset from which the swap search starts again."""
@@ -38,7 +38,7 @@ def _interrupt() -> None:
 
 @dataclass(frozen=True)
 class SelectionTask:
-    """A criterion to select by, and how far to go."""
+    """A criterion to select by, the largest size, and the effort."""
 
     objective: Objective
     largest: int | None = None
@@ -69,14 +69,18 @@ class SelectionTask:
 
 @dataclass(frozen=True)
 class FoundSubsets:
-    """The subsets of a heuristic by growing number of columns, each in the order in which its columns were added."""
+    """The subsets that a heuristic has found, by number of columns; each lists its columns in the order in which they
+    were added.
+    """
 
     subsets: tuple[IntArray, ...]
     proofs: Proofs | None = None
 
 
 def run(heuristic: str, task: SelectionTask) -> FoundSubsets:
-    """Run a heuristic by its name, unless the same was asked of it before: several begin with others."""
+    """Run a heuristic by its name; the result of the same heuristic on the same problem is reused, because several
+    heuristics start from others.
+    """
     key = (heuristic, task.objective, task.limit, task.smallest, task.effort)
     if key not in task.known:
         task.known[key] = heuristics[heuristic](task)
@@ -84,7 +88,7 @@ def run(heuristic: str, task: SelectionTask) -> FoundSubsets:
 
 
 def make_nested(task: SelectionTask, order: Subset) -> FoundSubsets:
-    """Return the nested subsets that an order of all groups passes through."""
+    """Return the nested subsets of growing size that an order of all groups gives."""
     columns = task.objective.list_columns(order)
     ends = np.cumsum(task.objective.widths[list(order)]).tolist()
     return FoundSubsets(tuple(columns[:end] for end in ends if end <= task.limit))

@@ -212,8 +212,8 @@ class Descent:
             descent = rewritten
 
     def _rewrite(self) -> Descent:
-        """Return a descent among the terms of the leanest program after rewriting, or as it was if rewriting exceeds
-        the budget. Mass matrices are computed again, which suffices for programs at the edge of the budget.
+        """Return a descent from the leanest program so far, rewritten with fewer operations, or this descent if the
+        rewritten program exceeds the budget.
         """
         passed = self.visited[min(self.visited)]
         simplified = self.history.rebuild(passed)

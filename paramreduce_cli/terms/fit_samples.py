@@ -28,11 +28,11 @@ class TermSamples:
     tangent: FloatArray | None
     """Projection of the torques of the program's n coordinates, (n_samples, n, n_dof); None for independent ones."""
     tau: FloatArray
-    """Torques to be met, (n_dof, n_samples)."""
+    """Torques to be predicted, (n_dof, n_samples)."""
     nominal_torque: FloatArray
     """(n_dof,)"""
     ddz: FloatArray
-    """Accelerations to be met by the direct dynamics, (n_dof, n_samples)."""
+    """Accelerations that the direct dynamics is to predict, (n_dof, n_samples)."""
     nominal_acceleration: FloatArray
     """(n_dof,)"""
 
@@ -49,7 +49,7 @@ class TermSamples:
 
     @cached_property
     def seeds(self) -> FloatArray:
-        """Torques by outputs of the program, (n_outputs, n_dof, n_samples)."""
+        """Derivatives of the torques with respect to the outputs of the program, (n_outputs, n_dof, n_samples)."""
         n, count = self.ddq.shape
         across = self._across
         if across is None:

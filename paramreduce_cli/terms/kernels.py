@@ -105,7 +105,7 @@ def _evaluate_node(
 def evaluate(
     program: Instructions, pruning: Pruning, inputs: FloatArray, which: BoolArray
 ) -> FloatArray:
-    """Return the values of the nodes asked for, zero for others, (n_nodes, n_samples)."""
+    """Return the values of the requested nodes, zero for others, (n_nodes, n_samples)."""
     kept, source, factor = pruning
     v = np.zeros((program.codes.size, inputs.shape[1]))
     for k in range(program.codes.size):
@@ -124,7 +124,7 @@ def evaluate(
 def evaluate_unreplaced(
     program: Instructions, pruning: Pruning, inputs: FloatArray, v: FloatArray
 ) -> FloatArray:
-    """Return the values that nodes would have if they were kept, (n_nodes, n_samples)."""
+    """Return the values that nodes would have if they were not replaced, (n_nodes, n_samples)."""
     own = np.empty(v.shape)
     for k in range(program.codes.size):
         _evaluate_node(k, program, pruning, inputs, v, own[k])
@@ -144,11 +144,11 @@ def _clear_first(derivatives: FloatArray, reached: BoolArray, q: int) -> None:
 def accumulate_adjoints(
     program: Instructions, pruning: Pruning, v: FloatArray, seeds: FloatArray, which: BoolArray
 ) -> tuple[FloatArray, BoolArray]:
-    """Return the derivatives by the nodes asked for.
+    """Return the derivatives of the quantities with respect to the requested nodes.
 
     Returns:
-        Derivatives, (n_nodes, n_quantities, n_samples), and which of them there are, (n_nodes, n_quantities): to
-        clear the others takes longer than all that is done here.
+        Derivatives, (n_nodes, n_quantities, n_samples), and a mask of those that are computed, (n_nodes, n_quantities);
+        the others are uninitialised.
     """
     codes, operands = program.codes, program.operands
     outputs = program.outputs
@@ -265,11 +265,11 @@ def compute_effects(
 def find_combinations(
     program: Instructions, pruning: Pruning, n: int
 ) -> tuple[IntArray, FloatArray]:
-    """Return the linear combinations of the first n inputs of which nodes are multiples.
+    """Return the linear combinations of the first n inputs that nodes are multiples of.
 
     Returns:
-        Nodes that are such combinations, NONE or SEVERAL, (n_nodes,); coefficients where a node is one,
-        (n_nodes, n).
+        Index of the first node that is the same combination, NONE or SEVERAL, (n_nodes,); the coefficients, (n_nodes,
+        n).
     """
     codes, operands = program.codes, program.operands
     numbers = program.numbers
@@ -324,7 +324,7 @@ def find_combinations(
 
 @compile_loop()
 def count_operations(program: Instructions, pruning: Pruning) -> int:
-    """Return the number of operations that are left."""
+    """Return the number of operations of a pruned program."""
     codes, operands = program.codes, program.operands
     kept, source, factor = pruning
     n = codes.size
@@ -382,7 +382,9 @@ def count_operations(program: Instructions, pruning: Pruning) -> int:
 
 @compile_loop()
 def count_flipped(program: Instructions, pruning: Pruning, candidates: IntArray) -> IntArray:
-    """Return the number of operations left after flipping each candidate, (n_candidates,)."""
+    """Return the number of operations after flipping each candidate: a removed term returns, a present one goes,
+    (n_candidates,).
+    """
     kept, source, factor = pruning
     result = np.empty(candidates.shape[0], dtype=np.int64)
     changed, sources = kept.copy(), source.copy()
@@ -408,7 +410,7 @@ def count_replaced(
     standing_for: IntArray,
     times: FloatArray,
 ) -> IntArray:
-    """Return the number of operations left with one more node replaced, (n_ways,)."""
+    """Return the number of operations after one more node is replaced, (n_replacements,)."""
     kept, source, factor = pruning
     result = np.empty(nodes.size, dtype=np.int64)
     sources, factors = source.copy(), factor.copy()

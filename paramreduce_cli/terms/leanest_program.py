@@ -73,6 +73,9 @@ def simplify(
 ) -> Found:
     """Remove terms and replace nodes as long as errors stay within a budget.
 
+    Descents begin at the starts, then near the best ends with formulations changed at random, then from programs
+    shortly before the best ends, written in other ways; the best ends are finished with more samples.
+
     Starts are gone down from, each in the formulation that is leanest for it, then others near the best ones, whose
     formulations are changed at random, as long as that helps; then, as long as that helps, once more from programs
     shortly before the best ends, written in other ways; from the best ends it goes on with more samples.
@@ -156,11 +159,11 @@ def _descend_further(
     """Make further descents, while in time, until a number of them in a row have improved nothing.
 
     Args:
-        working: Makes them.
+        working: Worker group that makes the descents.
         ends: Ends of the earlier descents.
         work: Work on an item.
         item: Function that makes an item from the earlier ends and its number.
-        patience: Number of descents that may bring nothing.
+        patience: Number of descents in a row without improvement after which the search ends.
         meter: Progress meter.
     """
     first = since = 0
@@ -181,7 +184,7 @@ def _find_fewest(ends: Iterable[SearchHistory]) -> int:
 
 
 def _list_first(searcher: Searcher, starts: Iterable[Start]) -> list[Descent]:
-    """Return descents from starts within the budget, as many as their operations allow."""
+    """Return the first descents, from starts within the budget; large programs get fewer."""
     begins: list[Descent] = []
     for one in map(searcher.start_descent, starts):
         if one.end.fit.within:

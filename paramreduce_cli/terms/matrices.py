@@ -44,11 +44,11 @@ def compute_roots(factors: FloatArray, weights: FloatArray) -> FloatArray:
 
 @compile_loop()
 def multiply_triangles(triangles: FloatArray, vectors: FloatArray) -> FloatArray:
-    """Return upper triangles times vectors, sample by sample.
+    """Return upper triangular matrices times vectors, sample by sample.
 
     Args:
-        triangles: As :func:`roots` gives them, (n, n, n_samples).
-        vectors: (k, n, n_samples)
+        triangles: Matrices, (n, n, n_samples).
+        vectors: Vectors, (k, n, n_samples).
 
     Returns:
         (k, n, n_samples)
@@ -65,11 +65,12 @@ def multiply_triangles(triangles: FloatArray, vectors: FloatArray) -> FloatArray
 
 @compile_loop()
 def compute_whitening(gram: FloatArray, ridge: float) -> FloatArray:
-    """Return the lower triangle that makes columns orthonormal, from their Gram matrix, (n, n).
+    """Return the lower triangular matrix that makes columns orthonormal, from their Gram matrix, (n, n).
 
     Args:
-        gram: (n, n)
-        ridge: Added to the squares of columns, as a share of them; of what is no more than that nothing is said.
+        gram: Gram matrix, (n, n).
+        ridge: Fraction of each column's square that is added to it; columns that depend on others to this fraction
+            count as zero.
     """
     n = gram.shape[0]
     size = np.empty(n)

@@ -84,8 +84,8 @@ class Searcher:
         return self.start_descent(start).descend()
 
     def descend_nearby(self, what: NearbyStart) -> SearchHistory | None:
-        """Descend from a start near another one, with noise half of the time; return None if it is not within the
-        budget. The function is the same at first, but at the edge of the budget rounding may decide.
+        """Descend from a start near another one, with noise half of the time; return None if that start exceeds the
+        budget.
         """
         rng = np.random.default_rng([self.seed, what.seed_index])
         start = vary_start(what.start, what.others, self.lean, rng, direct=self.direct)
@@ -106,7 +106,7 @@ class Searcher:
     def _make_search(
         self, start: Start, some: SearchSamples, turn: int = 0
     ) -> Callable[[Tape], TermSearch]:
-        """Return a function that makes the search of a tape."""
+        """Return a function that makes the term search of a program on some samples."""
 
         def made(tape: Tape) -> TermSearch:
             fitting = Fitting(

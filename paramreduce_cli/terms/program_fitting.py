@@ -41,7 +41,7 @@ class Budget:
 
 @dataclass(frozen=True)
 class Costs:
-    """The costs of changes of rows: what they add to the sum of squares, to first order."""
+    """The costs of changes of rows: increases of the sum of squares, to first order."""
 
     refitted: FloatArray
     """Costs if the parameters are fitted again, (k,). They are exact if the rows change by multiples of one combination
@@ -54,7 +54,7 @@ class Costs:
 
 @dataclass(frozen=True)
 class Linear:
-    """The least-squares problem that a fit is the solution of."""
+    """A linear least-squares problem and its solution, from which effects of changes are estimated."""
 
     rows: FloatArray
     """Transposed, (n_parameters, n_rows)."""
@@ -72,12 +72,13 @@ class Linear:
     def estimate_costs(
         self, changes: FloatArray, beta: FloatArray, combinations: FloatArray
     ) -> Costs:
-        """Return the costs of changes of rows.
+        """Return the costs of changes of rows, before and after fitting the parameters again.
 
         Args:
-            changes: Losses of the rows, (k, n_rows).
+            changes: Change of the rows by each removal, (k, n_rows).
             beta: Fitted parameters, (n_parameters,).
-            combinations: Combinations of parameters that the terms are multiples of, (k, n_parameters); zero for other terms.
+            combinations: Combinations of parameters that the removed terms are multiples of, (k, n_parameters); zero
+                for other terms.
         """
         size = np.einsum("cr,cr->c", changes, changes)
         along = changes @ self.residual
@@ -167,12 +168,12 @@ class Fitting:
         return inputs
 
     def fit(self, pruning: Pruning, beta: FloatArray, checks: int = 1) -> TermFit:
-        """Fit the parameters.
+        """Fit the parameters of a pruned program.
 
         Args:
             pruning: Pruning of the program.
-            beta: Values to start from, for the mass matrices that accelerations are found with.
-            checks: Number of times that the weights are computed again.
+            beta: Start values, from which mass matrices are computed that weigh accelerations.
+            checks: Number of times that the weights are updated.
         """
         samples = self.samples
         needed = self.tape.mark_live(pruning)
@@ -219,7 +220,7 @@ class Fitting:
         return TermFit(pruning, beta, *errors, cost, total, float(np.max(shares)), linear)
 
     def _compute_ratios(self, errors: tuple[float, float]) -> list[float]:
-        """Return the errors over the allowed ones."""
+        """Return the ratios of the errors to those that the budget allows."""
         torque, acceleration = errors
         if not self.samples.direct:
             return [torque / self.budget.torque]
@@ -228,7 +229,7 @@ class Fitting:
         return [torque / self.budget.torque, fraction]
 
     def _compute_errors(self, off: FloatArray, inverse: FloatArray | None) -> tuple[float, float]:
-        """Return the errors of torques and of accelerations from differences of torques."""
+        """Return the errors of torques and of accelerations, given differences of torques."""
         torque = float(np.linalg.norm(off * self._torque_scale[:, None]))
         if not self.samples.direct:
             return torque, np.nan
@@ -257,8 +258,8 @@ class Fitting:
         return self._weigh(found.reshape(-1, *self.samples.tau.shape), fit.linear.metric)
 
     def list_substitutions(self, fit: TermFit) -> tuple[Substitutions, FloatArray, FloatArray]:
-        """Return the substitutions of nodes by others, with the arguments of :meth:`Substitutions.estimate_changes`:
-        the values of all nodes, and the weighted derivatives of the torques by them.
+        """Return possible substitutions of nodes by others, the values of all nodes, and the weighted derivatives of
+        the torques with respect to the nodes.
         """
         values, _, adjoints = self._differentiate(fit)
         pulls = self._weigh(adjoints, fit.linear.metric).reshape(adjoints.shape)
@@ -271,8 +272,8 @@ class Fitting:
         return substitutions.add_ones(constants[itself[constants]]), values, pulls
 
     def _differentiate(self, fit: TermFit) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return the values of nodes in the pruned program, the values they would have unpruned, and the derivatives of
-        the torques by nodes.
+        """Return the values of nodes in the pruned program, their values without replacements, and the derivatives of
+        the torques with respect to the nodes.
         """
         inputs, everywhere = (
             self._stack_inputs(fit.beta, self.samples),
@@ -283,8 +284,8 @@ class Fitting:
         return values, self.tape.evaluate_unreplaced(fit.pruning, inputs, values), adjoints
 
     def _compute_metric(self, inverse: FloatArray | None) -> FloatArray | None:
-        """Return square roots of the quadratic forms that take differences of torques to the cost, (n_dof, n_dof,
-        n_samples); None if only torques matter, whose form is diagonal.
+        """Return the matrices whose squares turn differences of torques into cost, (n_dof, n_dof, n_samples); None if
+        only torques matter, each with its own weight.
         """
         if inverse is None or np.isinf(self.budget.acceleration):
             return None
@@ -292,7 +293,7 @@ class Fitting:
         return compute_roots(caused, self._torque_scale / self.budget.torque)
 
     def _weigh(self, torques: FloatArray, metric: FloatArray | None) -> FloatArray:
-        """Return torques as they enter the cost, (k, n_rows)."""
+        """Return torques weighted as in the cost, (k, n_rows)."""
         if metric is None:
             scaled = torques * (self._torque_scale / self.budget.torque)[:, None]
         else:
@@ -301,11 +302,11 @@ class Fitting:
 
 
 def _solve_normal_equations(rows: FloatArray, target: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return least-squares parameters by the normal equations of unit columns, which are fast.
+    """Return least-squares parameters by normal equations of columns of unit length, which is fast.
 
     Args:
-        rows: Transposed, (n_parameters, n_rows).
-        target: (n_rows,)
+        rows: Transposed matrix, (n_parameters, n_rows).
+        target: Vector to be met, (n_rows,).
 
     Returns:
         The parameters, and the inverse of the triangular factor of their Gram matrix.

@@ -16,7 +16,7 @@ node that replaces it."""
 
 
 class Instructions(NamedTuple):
-    """A program before pruning; every node takes nodes before it as operands."""
+    """A program before pruning; operands of a node come before it."""
 
     codes: IntArray
     """Code of the operation, (n_nodes,)."""
@@ -50,8 +50,8 @@ class Pruning(NamedTuple):
         return np.where(what == ITSELF, self.source[nodes] == nodes, kept)
 
     def flip(self, terms: IntArray) -> Pruning:
-        """Return the pruning with some terms flipped: removed terms return, present ones go; replaced nodes become
-        themselves.
+        """Return the pruning with some terms flipped: removed terms return, present ones are removed, and a replaced
+        node takes its own value again.
         """
         kept, source, factor = self.kept.copy(), self.source.copy(), self.factor.copy()
         own = terms[:, 1] == ITSELF
@@ -60,7 +60,7 @@ class Pruning(NamedTuple):
         return Pruning(kept, source, factor)
 
     def replace(self, node: int, source: int, factor: float) -> Pruning:
-        """Return the pruning in which a node is replaced by an earlier one times a factor, or by a number."""
+        """Return the pruning in which a node is replaced by a multiple of an earlier node, or by a number."""
         sources, factors = self.source.copy(), self.factor.copy()
         sources[node], factors[node] = source, factor
         return Pruning(self.kept, sources, factors)

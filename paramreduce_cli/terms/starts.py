@@ -22,7 +22,7 @@ _OTHER = 0.2
 
 @dataclass(frozen=True, eq=False)
 class Start:
-    """A reduced model to leave terms of out of."""
+    """A reduced model whose terms are to be removed."""
 
     heuristic: str
     model: ReducedModel
@@ -34,7 +34,7 @@ class Start:
     """Formulation of the start; None for the leanest."""
 
     def build_program(self, lean: LeanModels, *, direct: bool) -> Program:
-        """Return the program with all terms; its first inputs are the parameters of the model.
+        """Return the program with all terms, not rewritten; its first inputs are the parameters of the model.
 
         It is not rewritten yet, as its terms are not those that are left in the end.
         """
@@ -48,15 +48,14 @@ class Start:
 def list_starts(
     torque_error: float, lean: LeanModels, model: Model, reduction: Reduction, *, direct: bool
 ) -> list[Start]:
-    """Return the subsets within the budget on the estimation set, the smallest first, and of one size the leanest
-    first.
+    """Return the subsets within the budget on the estimation set, by size, and those of one size by operations.
 
     Args:
-        torque_error: Allowed on the estimation set.
-        lean: Counts operations.
+        torque_error: Torque error that is allowed on the estimation set.
+        lean: Lean models of the robot, which count operations.
         model: Model of the robot.
-        reduction: The subsets.
-        direct: Whether operations of the direct dynamics count.
+        reduction: Reduction whose subsets are candidates.
+        direct: Whether operations of the direct dynamics are counted.
     """
     entries: dict[frozenset[str], Start] = {}
     for name, found in reduction.heuristics.items():
@@ -78,7 +77,7 @@ def order_by_estimate(starts: list[Start], smallest: int) -> Iterator[Start]:
 
     Args:
         starts: Starts from :func:`list_starts`.
-        smallest: Parameters of those that are small enough.
+        smallest: Number of parameters from which subsets are taken.
     """
     sizes: dict[int, list[Start]] = defaultdict(list)
     for start in starts:
@@ -100,14 +99,14 @@ def vary_start(
     *,
     direct: bool,
 ) -> Start:
-    """Return a start near another one: its formulation is varied, and sometimes its subset replaced.
+    """Return a start near another one: its formulation is varied, and sometimes its subset is replaced.
 
     Which formulation takes the fewest operations once terms are left out cannot be told before.
 
     Args:
         start: Start to vary.
-        others: Whose subsets may take the place of its own, and whose formulations are looked at.
-        lean: Has more of these, and one for every start that has none of its own.
+        others: Starts whose subsets and formulations may be used instead.
+        lean: Lean models of the robot, with the formulations to choose from.
         rng: Random generator.
         direct: Whether [M | delta] is meant, not torques.
     """

@@ -42,9 +42,7 @@ class Substitutions:
         return int(self.nodes[which]), int(self.sources[which]), float(self.factors[which])
 
     def estimate_changes(self, values: FloatArray, pulls: FloatArray) -> FloatArray:
-        """Return the change of the rows by each substitution, to first order, (n_ways, n_rows); for arguments see
-        :func:`find_substitutions`.
-        """
+        """Return the change of the rows by each substitution, to first order, (n_substitutions, n_rows)."""
         stand_in = np.where(
             (self.sources == NUMBER)[:, None],
             self.factors[:, None],
@@ -57,7 +55,7 @@ class Substitutions:
 def find_substitutions(
     values: FloatArray, pulls: FloatArray, residual: FloatArray, free: BoolArray, linear: BoolArray
 ) -> Substitutions:
-    """Return the most promising replacements of nodes by multiples of earlier ones.
+    """Return the most promising replacements of nodes by multiples of earlier nodes.
 
     With w the weighed derivatives of the rows by node k, v values, and r the residual, the cost of
     c v_j in place of v_k is c^2 sum w^2 v_j^2 - 2 c sum (w^2 v_k v_j + w r v_j) + constant, whose

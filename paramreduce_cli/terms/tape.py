@@ -74,6 +74,8 @@ class Tape:
     def list_candidates(self) -> IntArray:
         """Return all terms as pairs of node and part, (n_candidates, 2).
 
+        The last ones restore replaced nodes and cannot be removed.
+
         All but the last ones can be left out. These are nodes as what they are, which can be put back
         where they stand for others.
         """
@@ -105,7 +107,7 @@ class Tape:
         return result
 
     def find_parameters(self, n: int) -> IntArray:
-        """Return the nodes of the first inputs, -1 for inputs that the program does not use, (n,)."""
+        """Return the indices of the nodes of the first n inputs, -1 for inputs that the program does not use, (n,)."""
         result = np.full(n, NONE)
         inputs = np.flatnonzero(self._instructions.codes == INPUT)
         positions = self._instructions.numbers[inputs].astype(np.int64)
@@ -153,12 +155,12 @@ class Tape:
     def compute_adjoints(
         self, pruning: Pruning, values: FloatArray, seeds: FloatArray, which: BoolArray
     ) -> FloatArray:
-        """Return the derivatives of quantities that are linear in the outputs, by nodes.
+        """Return the derivatives of quantities, which are linear in the outputs, with respect to nodes.
 
         Args:
             pruning: Pruning of the program.
             values: Values of the nodes.
-            seeds: Derivatives of the quantities by the outputs, (n_outputs, n_quantities, n_samples).
+            seeds: Derivatives of the quantities with respect to the outputs, (n_outputs, n_quantities, n_samples).
             which: Mask of the requested nodes and of everything that depends on them, (n_nodes,).
 
         Returns:
@@ -176,7 +178,7 @@ class Tape:
         which: BoolArray,
         nodes: IntArray,
     ) -> FloatArray:
-        """Return the derivatives by some of the requested nodes, (k, n_quantities, n_samples)."""
+        """Return the derivatives with respect to some of the requested nodes, (k, n_quantities, n_samples)."""
         found, reached = self._compute_adjoints(pruning, values, seeds, which)
         some = found[nodes]
         some[~reached[nodes]] = 0.0
@@ -209,7 +211,8 @@ class Tape:
         )
 
     def find_combinations(self, pruning: Pruning, terms: IntArray, n: int) -> FloatArray:
-        """Return the linear combinations of the first n inputs that terms are multiples of, (n_terms, n).
+        """Return the linear combinations of the first n inputs that terms are multiples of, (n_terms, n); zero for
+        terms of another form.
 
         Zero for terms that are no multiple of one, or for which that cannot be seen.
         """
@@ -244,7 +247,7 @@ class Tape:
         )  # fmt: skip
 
     def rebuild(self, pruning: Pruning) -> Program:
-        """Return the program that is left."""
+        """Return the pruned program."""
         nodes = [Node("constant")]
         stands_for: list[int] = []
 

@@ -71,13 +71,13 @@ class TermSearch:
         noise: float = 0.0,
         until: int = 0,
     ) -> Step:
-        """Remove terms until any further one would exceed the budget, or few enough operations are left.
+        """Remove terms until every further removal would exceed the budget, or the program is lean enough.
 
         Args:
             step: Step to start from.
-            visit: Called with every program on the way.
+            visit: Function that is called with every program on the way.
             noise: Standard deviation of noise on the logarithm of estimated costs.
-            until: Operations that are few enough.
+            until: Number of operations at which to stop.
         """
         weights = np.exp(noise * self._rng.normal(size=len(self._candidates)))
         while step.count > until:
@@ -93,11 +93,12 @@ class TermSearch:
         return step
 
     def restore_budget(self, pruning: Pruning, beta: FloatArray) -> Step:
-        """Put back as many terms as errors need to be within the budget, if that is enough.
+        """Restore the most helpful terms until errors are within the budget; the result exceeds the budget if no term
+        helps any more.
 
         Args:
             pruning: Pruning of the program.
-            beta: Values to start from.
+            beta: Parameters to start from.
         """
         fit = self._fitting.fit(pruning, beta, checks=2)
         restored: list[int] = []
@@ -146,13 +147,13 @@ class TermSearch:
     def _remove_several(
         self, step: Step, live: IntArray, costs: FloatArray, saved: FloatArray
     ) -> Step | None:
-        """Return the program without all terms that cost little together, or None if they are few.
+        """Return the program without all terms that cost little, or None if these are few.
 
         Args:
             step: Step to start from.
-            live: Terms, (n_terms, 2).
+            live: Terms that may be removed, (n_terms, 2).
             costs: Cost of removing each term, (n_terms,).
-            saved: Operations, (n_terms,).
+            saved: Number of operations that each removal saves, (n_terms,).
         """
         fit = step.fit
         order = np.argsort(costs / saved, kind="stable")
@@ -218,7 +219,7 @@ class TermSearch:
         )
 
     def _find_most_helpful(self, fit: TermFit, but: list[int]) -> int | None:
-        """Return the number of the term whose return helps most for its operations, or None if none helps."""
+        """Return the index of the term whose return lowers the errors most per operation, or None if none does."""
         removed = ~fit.pruning.has(self._candidates)
         removed[but] = False
         numbers = np.flatnonzero(removed)

@@ -7,14 +7,15 @@ from paramreduce_cli.records import FloatArray
 
 
 def condition_number(eigenvalues: FloatArray, sharpness: float) -> tuple[float, FloatArray]:
-    """Return the log of (sum l^p)^(1/2p) (sum l^-p)^(1/2p), which goes to log kappa as p grows.
+    """Return the logarithm of a smooth condition number, log (sum l^p)^(1/2p) (sum l^-p)^(1/2p), which goes to log
+    kappa as p grows.
 
     Args:
         eigenvalues: Eigenvalues of W'W, (r,).
         sharpness: The exponent p; infinite for the condition number itself.
 
     Returns:
-        Value and derivative by the eigenvalues, (r,).
+        Value, and its derivative with respect to the eigenvalues, (r,).
     """
     safe = np.maximum(eigenvalues, SMALLEST)
     logs = np.log(safe)
@@ -29,7 +30,7 @@ def condition_number(eigenvalues: FloatArray, sharpness: float) -> tuple[float, 
 
 
 def _compute_log_sum_exp(values: FloatArray) -> tuple[float, FloatArray]:
-    """Return log sum exp and each term's share; SciPy's function takes longer than the rest of the criterion."""
+    """Return log sum exp and the fraction of each term."""
     largest = float(values.max())
     terms = np.exp(values - largest)
     total = float(terms.sum())

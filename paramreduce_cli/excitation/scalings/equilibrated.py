@@ -9,7 +9,7 @@ from paramreduce_cli.records import FloatArray
 
 
 def equilibrated(W: FloatArray, beta: FloatArray, norm: float) -> tuple[FloatArray, Pullback]:
-    """Return the columns divided by their largest magnitude, then the rows by theirs."""
+    """Return the matrix with its columns divided by their largest magnitude, then its rows by theirs."""
     columns, pull_columns = _divide_by_largest(W, 0, norm)
     rows, pull_rows = _divide_by_largest(columns, 1, norm)
     return rows, lambda _, C: pull_columns(pull_rows(rows @ C))
@@ -18,7 +18,7 @@ def equilibrated(W: FloatArray, beta: FloatArray, norm: float) -> tuple[FloatArr
 def _divide_by_largest(
     W: FloatArray, axis: int, norm: float
 ) -> tuple[FloatArray, Callable[[FloatArray], FloatArray]]:
-    """Return W divided by its largest magnitudes along an axis, and the pullback of derivatives."""
+    """Return W divided by its largest magnitudes along an axis, and the function that maps derivatives back."""
     size, fraction = _compute_largest(W, axis, norm)
     scaled = W / size
 
@@ -31,7 +31,7 @@ def _divide_by_largest(
 
 
 def _compute_largest(W: FloatArray, axis: int, norm: float) -> tuple[FloatArray, FloatArray]:
-    """Return the largest magnitude along an axis and its derivative by W.
+    """Return a smooth maximum of the magnitudes along an axis, and its derivative with respect to W.
 
     The maximum is smooth: a norm whose exponent is a power of two, as such powers are cheap.
     """

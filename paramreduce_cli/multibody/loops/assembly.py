@@ -38,7 +38,7 @@ _ANOTHER_MODE = 1e-3
 
 
 def assemble(mechanism: Mechanism) -> Mechanism:
-    """Return the mechanism with its loops closed, and its independent coordinates as in the guess.
+    """Return the mechanism with its loops closed, and with the independent coordinates at the values of the guess.
 
     Raises:
         NumericalError: The loops cannot be closed from the guess, equations are redundant, or the
@@ -73,9 +73,8 @@ def find_assembly(mechanism: Mechanism, driven: Sequence[int]) -> tuple[FloatArr
     """Close the loops with all coordinates free to move, and choose coordinates that determine all others.
 
     Args:
-        mechanism: A mechanism with loops, whatever coordinates are called independent; it is closed
-            from its guess.
-        driven: Positions of coordinates that are to be independent if they can, the most wanted first.
+        mechanism: Mechanism with loops, with any choice of independent coordinates; the guess is the start.
+        driven: Positions of the coordinates that should be independent if possible, the most preferred first.
 
     Returns:
         Generalised coordinates with closed loops, (n_q,), and positions of independent ones.
@@ -161,7 +160,7 @@ class _Equations:
 def _close(
     equations: _Equations, mechanism: Mechanism, loops: Loops, moving: Iterable[int]
 ) -> FloatArray:
-    """Move some coordinates from the guess until the loops are closed.
+    """Move some coordinates from the guess until the loops are closed, and return the configuration.
 
     Raises:
         NumericalError: The loops stay open; the message says by how much, and which closure most.
@@ -207,7 +206,10 @@ def _close(
 
 
 def _close_nearby(equations: _Equations, mechanism: Mechanism, loops: Loops) -> FloatArray:
-    """Move all coordinates from the guess until the loops are closed.
+    """Move all coordinates from the guess until the loops are closed, and return the configuration.
+
+    If that fails, as from a guess with all links in one line, it is tried again from random configurations near the
+    guess.
 
     A guess of zeros may be a pose in which all links lie in one line, which no step leads away from; then
     they are moved at random before, a little at first.
@@ -236,7 +238,18 @@ def _close_nearby(equations: _Equations, mechanism: Mechanism, loops: Loops) -> 
 def _close_as_given(
     equations: _Equations, mechanism: Mechanism, loops: Loops, nearest: FloatArray
 ) -> FloatArray:
-    """Close the loops with the independent coordinates as they are in the guess.
+    """Close the loops with the independent coordinates at the values of the guess.
+
+    If these are all zero and the loops do not close, ``nearest`` is returned, with a warning.
+
+    Args:
+        equations: Closure equations.
+        mechanism: Mechanism whose dependent coordinates are moved.
+        loops: Loops with the guess.
+        nearest: Configuration with closed loops that was found with all coordinates free to move.
+
+    If the guess leaves these at zero and the loops do not close, the configuration nearest to the guess is used
+    instead, with a message.
 
     Where the guess is zero for all of these, or leaves them out, and the loops do not close so, they are closed where
     all coordinates came to that were free to move, which is said.
@@ -275,13 +288,13 @@ def _list_nearby(equations: _Equations, q: FloatArray) -> list[FloatArray]:
 
 
 def _choose_generic(jacobians: list[FloatArray]) -> tuple[FloatArray, list[int]]:
-    """Choose the Jacobian of the largest rank, and its rows that do not depend on those before them."""
+    """Choose the Jacobian of largest rank, and its independent rows, each independent of the rows before it."""
     found = ((J, select_independent(J.T, _find_nonzero_rows(J), _RANK)) for J in jacobians)
     return max(found, key=lambda pair: len(pair[1]))
 
 
 def _find_loop_coordinates(mechanism: Mechanism) -> list[int]:
-    """Return the coordinates that a closure depends on: not those of a floating base, nor of an arm beside the loops."""
+    """Return the coordinates that closures depend on, without those of a floating base or of an arm that is in no loop."""
     assert mechanism.loops is not None
     found: set[int] = set()
     for closure in mechanism.loops.closures:
@@ -300,7 +313,7 @@ def _find_carriers(mechanism: Mechanism, body: int) -> set[int]:
 
 
 def _find_nonzero_rows(jacobian: FloatArray) -> IntArray:
-    """Find the rows that are not zero to rounding, which every row of a unit length of its own would hide."""
+    """Find the rows that are not zero to rounding, relative to the largest row."""
     lengths = np.linalg.norm(jacobian, axis=1)
     return np.flatnonzero(lengths > _ROUNDING * lengths.max(initial=0.0))
 
@@ -359,7 +372,7 @@ def _compute_rank(jacobian: FloatArray) -> int:
 
 
 def _check_choice(mechanism: Mechanism, jacobians: list[FloatArray]) -> None:
-    """Raise NumericalError unless the independent coordinates are as many as the freedom, and independent."""
+    """Raise NumericalError unless the independent coordinates are as many as the degrees of freedom, and independent."""
     jacobian, rows = _choose_generic(jacobians)
     freedom = mechanism.n_q - len(rows)
     names = mechanism.generalised_names
@@ -392,7 +405,7 @@ def _check_regular(mechanism: Mechanism, jacobian: FloatArray) -> None:
 
 
 def _check_hinges(mechanism: Mechanism, loops: Loops, q: FloatArray) -> None:
-    """Refuse closures whose axes are against each other, which their equations allow.
+    """Raise NumericalError if the two axes of a hinge closure point in opposite directions, which its equations allow.
 
     Raises:
         NumericalError: Two axes are against each other.
@@ -412,7 +425,7 @@ def _check_hinges(mechanism: Mechanism, loops: Loops, q: FloatArray) -> None:
 
 
 def _suggest_independent(mechanism: Mechanism, jacobian: FloatArray) -> list[int]:
-    """Return coordinates that can be independent, those already named first as far as they can be."""
+    """Return coordinates that can be independent; as many as possible of those that the user has named."""
     others = [k for k in range(mechanism.n_q) if k not in mechanism.independent]
     order = np.array([*others, *mechanism.independent], dtype=np.int64)
     dependent = select_independent(jacobian, order, _RANK)

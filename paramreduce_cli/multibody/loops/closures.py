@@ -107,7 +107,7 @@ def _express_coupling(pair: _ClosedPair) -> list[ca.SX]:
 
 
 class ClosureType(NamedTuple):
-    """A type of closure, with the equations that it asks for."""
+    """A type of closure, with its equations."""
 
     equations: tuple[str, ...]
     """Meaning of each equation."""

@@ -130,7 +130,7 @@ class Coordinates:
 
         Args:
             q: Generalised coordinates, (n_samples, n_q).
-            dz: Velocities of the independent ones, (n_samples, n_dof).
+            dz: Velocities of the independent coordinates, (n_samples, n_dof).
             ddz: Accelerations, same shape.
         """
         if self.mechanism.loops is None:
@@ -139,7 +139,8 @@ class Coordinates:
         return dq, ddq
 
     def _march(self, z: FloatArray, start: FloatArray | None) -> tuple[FloatArray, FloatArray]:
-        """Follow a motion in time, as a straight path to far samples might lead to other assembly modes.
+        """Follow a motion from sample to sample, because a direct path to distant samples could end in another assembly
+        mode. A few samples are followed one after the other; those between start from the nearest of them.
 
         Every few samples one after the other, those between from the one before.
         """
@@ -154,7 +155,7 @@ class Coordinates:
         return self.follow(z, known[np.arange(z.shape[0]) // _LEADERS])
 
     def follow(self, z: FloatArray, start: FloatArray | None) -> tuple[FloatArray, FloatArray]:
-        """Move every sample from a known position towards the one that is asked for.
+        """Move every sample from a known position towards its target, with the loops closed.
 
         Args:
             z: Independent coordinates to reach, (n_samples, n_dof).
@@ -185,7 +186,7 @@ class Coordinates:
         return q, made
 
     def _check_reached(self, z: FloatArray, reached: FloatArray) -> None:
-        """Raise DataError if a sample was not reached."""
+        """Raise DataError if a sample did not reach its target."""
         if (reached == 1).all():
             return
         worst = int(np.argmin(reached))
@@ -207,7 +208,7 @@ class Coordinates:
         return R
 
     def check_motion(self, time: FloatArray, q: FloatArray) -> None:
-        """Refuse a motion on which the dependent coordinates are not determined throughout.
+        """Raise DataError if the dependent coordinates are not determined at every sample of a motion.
 
         Args:
             time: Time of consecutive samples, (n_samples,), s.
@@ -245,7 +246,7 @@ class Coordinates:
             )
 
     def check_side(self, z: FloatArray, q: FloatArray) -> None:
-        """Refuse positions beyond a singular configuration, seen from the assembly.
+        """Raise DataError if a position is separated from the assembly by a singular configuration.
 
         Raises:
             DataError: The determinant of Phi_d has the other sign at a sample.

@@ -37,7 +37,9 @@ class Follower:
         return self._last[1]
 
     def _find_positions(self, z: FloatArray) -> FloatArray:
-        """Return positions, found from those of the last call, or from the assembly if these lead elsewhere."""
+        """Return positions, found from those of the previous call, or from the assembly if these lead to another
+        assembly mode.
+        """
         if self._kept is not None:
             with contextlib.suppress(DataError):
                 q = self._coordinates.compute_positions(z, self._kept)

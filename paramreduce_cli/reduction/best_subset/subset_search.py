@@ -229,7 +229,7 @@ class Search:
         return min(searched, float(state.errors[level, self._kernel.BOUND]), *waiting)
 
     def _bound_exclusion(self, level: int) -> float:
-        """Return the bound of the branch that a level has still to take."""
+        """Return the bound of the branch of a level that has not been searched: the one without the level's column."""
         kernel, state = self._kernel, self._state
         tableau, counters = state.sheets[level], state.numbers[level]
         n, nullity = tableau.shape[1], int(counters[kernel.NULLITY])

@@ -13,13 +13,13 @@ def find_ties(squared_errors: FloatArray, best: float) -> BoolArray:
 
 
 def find_first_tie(problem: GroupedProblem, subset: IntArray, squared_error: float) -> IntArray:
-    """Return the lexicographically first subset among ties that single swaps lead to.
+    """Return the first subset, in lexicographic order, of those with the same error that single swaps reach.
 
     Subsets that span the same space are the bases of a matroid, whose first basis is reached from any other by swaps
     that each make it come earlier.
 
     Args:
-        problem: The columns; groups of them are not exchanged.
+        problem: Problem with the columns; groups of several columns are not swapped.
         subset: Numbered as its columns.
         squared_error: Squared error of the subset, a share of that of chi.
 

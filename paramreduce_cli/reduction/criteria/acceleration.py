@@ -86,7 +86,7 @@ class _Accelerations:
         return _Point(parameters, error, residual, ddz, M)
 
     def compute_slope(self, point: _Point, columns: IntArray) -> FloatArray:
-        """Return minus the derivative of the residual by the parameters, (n_samples n_dof, n)."""
+        """Return minus the derivative of the residual with respect to the parameters, (n_samples n_dof, n)."""
         K = (self._A[columns] @ point.ddz[..., None])[..., 0] + self._B[columns]
         slope = np.linalg.inv(point.M) @ np.moveaxis(K, 0, -1) / self.data.nominal[:, None]
         return slope.reshape(-1, columns.size)
@@ -128,7 +128,7 @@ def _solve_least_squares(X: FloatArray, y: FloatArray) -> FloatArray:
 
 
 class AccelerationObjective(Objective):
-    """The exact acceleration error; its linearisation at a subset proposes what to try."""
+    """The exact acceleration error; its linearisation selects which swaps are evaluated."""
 
     negligible = 1e-7
 
@@ -153,7 +153,10 @@ class AccelerationObjective(Objective):
         return self._fit_once(kept)[0]
 
     def _fit_once(self, kept: Subset) -> tuple[float, _Point | None]:
-        """Return error and fitted point of a subset, kept for the next time; None if the fit is hopeless."""
+        """Return error and fitted point of a subset, from the cache if known.
+
+        If the fit fails or its error is far too large, the error is a larger estimate and the point is None.
+        """
         key = frozenset(kept)
         if key not in self._known:
             columns = self._sort_columns(kept)
@@ -182,8 +185,8 @@ class AccelerationObjective(Objective):
         return TorqueObjective(self.problem.replace_data(factor))
 
     def estimate_gains(self, kept: Subset) -> FloatArray:
-        """Return the fall of the error per column for the most promising groups; -inf for groups that are not evaluated,
-        (n_groups,).
+        """Return the fall of the error per column for the groups whose estimated fall is largest; -inf for groups that
+        are not evaluated, (n_groups,).
         """
         promised = self._linearise(kept).estimate_gains(kept)
         result = np.full(promised.size, -np.inf)
@@ -194,8 +197,8 @@ class AccelerationObjective(Objective):
         return result
 
     def estimate_losses(self, kept: Subset) -> FloatArray:
-        """Return the rise of the error per column for the groups that promise to cost least; inf for groups that are not
-        evaluated, (n_groups,).
+        """Return the rise of the error per column for the groups whose estimated rise is smallest; inf for groups that
+        are not evaluated, (n_groups,).
         """
         promised = self._linearise(kept).estimate_losses(kept)
         result = np.full(promised.size, np.inf)

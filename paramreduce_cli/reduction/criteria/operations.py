@@ -40,7 +40,7 @@ class OperationsObjective(Objective):
 
     @cached_property
     def largest(self) -> int:
-        """A few more than greedy selection by torque needs to keep the limit."""
+        """Number of columns that greedy selection by torque needs for the limit, and a few more."""
         kept: Subset = ()
         while self._torque.score(kept) > self._limit:
             longer = self._torque.add_best(kept, super().largest)

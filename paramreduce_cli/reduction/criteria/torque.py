@@ -51,7 +51,9 @@ class TorqueObjective(Objective):
         return gains if self.single else self._add_group_gains(rest, gains)
 
     def _add_group_gains(self, rest: Orthogonaliser, gains: FloatArray) -> FloatArray:
-        """Write the gains of groups of several columns: what the columns explain together, per column."""
+        """Write the gains of groups of several columns, per column: the fall of the squared error if all columns of the
+        group are added.
+        """
         result = np.full(self.widths.size, -np.inf)
         for group, width in enumerate(self.widths.tolist()):
             own = np.flatnonzero((self.owner == group) & (gains > -np.inf))
@@ -77,7 +79,10 @@ class TorqueObjective(Objective):
         return result
 
     def swap_best(self, kept: Subset) -> Subset:
-        """Return the subset after the best swap, by the closed form of its error; groups are tried one by one."""
+        """Return the subset after the best swap.
+
+        Single columns are compared by a closed formula, groups are tried one by one.
+        """
         if not self.single:
             out, into, error = min(
                 self._try_one_by_one(kept),
@@ -93,7 +98,7 @@ class TorqueObjective(Objective):
         return (*remove_group(kept, kept[place]), group)
 
     def list_promising_swaps(self, kept: Subset, most: int) -> list[Subset]:
-        """Return the subsets after the swaps that improve most, or worsen least."""
+        """Return the subsets after the swaps that lower the error most, or raise it least."""
         improvement = self._compute_improvements(kept) if self.single else None
         if improvement is None:
             found = sorted(self._try_one_by_one(kept), key=lambda exchange: exchange[2])[:most]
@@ -157,7 +162,9 @@ class TorqueObjective(Objective):
                 yield group, into, self.score((*rest, into))
 
     def _project_out(self, kept: Subset) -> Orthogonaliser:
-        """Return what a subset leaves of all columns; quick if the subset extends the last one."""
+        """Return the residuals of all columns after projection on a subset; quick if the subset extends the previous
+        one.
+        """
         projected, rest = self._taken
         if kept[: len(projected)] != projected:
             projected, rest = (), self._start_orthogonaliser()
@@ -194,7 +201,7 @@ def _compute_removal_costs(X: FloatArray, y: FloatArray, groups: list[IntArray])
 
 
 def _compute_rise(X: FloatArray, y: FloatArray, part: IntArray) -> float:
-    """Return the rise of the squared error without some columns, by fitting twice."""
+    """Return the rise of the squared error without some columns, from two fits."""
 
     def squared_error(kept: FloatArray) -> float:
         left = y - kept @ np.linalg.lstsq(kept, y, rcond=DEPENDENT)[0] if kept.size else y

@@ -5,7 +5,7 @@ from paramreduce_cli.reduction.task import FoundSubsets, SelectionTask, make_nes
 
 
 def backward_elimination(task: SelectionTask) -> FoundSubsets:
-    """Remove, one by one, the parameter whose loss costs least.
+    """Remove, one by one, the parameter whose removal raises the criterion least.
 
     As long as columns are dependent many removals are free. Which of them comes first decides
     what can be reached later, so it is not left to chance: of the free ones the parameter goes

@@ -6,7 +6,7 @@ from paramreduce_cli.reduction.task import FoundSubsets, SelectionTask, append_o
 
 
 def floating(task: SelectionTask) -> FoundSubsets:
-    """Add the best parameter, then remove as long as that leaves a better subset than before.
+    """Add the best parameter, then remove parameters as long as that gives the best subset of its size so far.
 
     After every addition the parameter that costs least is taken out if the smaller subset is
     better than the best one of its size so far, and again, until it is not.
@@ -33,7 +33,7 @@ def floating(task: SelectionTask) -> FoundSubsets:
 def _keep_if_better(
     task: SelectionTask, best: dict[int, tuple[float, Subset]], kept: Subset
 ) -> bool:
-    """Keep a subset if it is better than the best of its size so far, and return whether it is."""
+    """Store a subset if it is better than the best of its size so far, and return whether it is."""
     n, score = task.objective.count_columns(kept), task.objective.score(kept)
     if n in best and not score < best[n][0] * (1 - TIE):
         return False

@@ -4,7 +4,7 @@ from paramreduce_cli.reduction.task import FoundSubsets, SelectionTask, append_o
 
 
 def forward_selection(task: SelectionTask) -> FoundSubsets:
-    """Add, one by one, the parameter that is worth most.
+    """Add, one by one, the parameter that lowers the criterion most.
 
     By torques that is the one that lowers the error most: for a column of which r is left after
     projecting out the subset, the squared error falls by (r . e)^2 / (r . r), e being what is left

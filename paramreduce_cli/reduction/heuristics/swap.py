@@ -18,7 +18,7 @@ _KICKED = 3
 
 
 def swap(task: SelectionTask) -> FoundSubsets:
-    """Exchange one parameter for another as long as that helps, from many starts.
+    """Swap one parameter for another as long as that lowers the criterion, from many starts.
 
     Starts are the subsets of forward selection, backward elimination and QR, those of the
     neighbouring sizes with a parameter more or less, and random changes of the best subset. A
@@ -41,7 +41,7 @@ def swap(task: SelectionTask) -> FoundSubsets:
 
 @dataclass
 class _SwapSearch:
-    """The best subset of each number of columns so far."""
+    """A search that stores the best subset of each number of columns."""
 
     objective: Objective
     smallest: int

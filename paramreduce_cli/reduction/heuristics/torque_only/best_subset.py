@@ -7,6 +7,9 @@ from paramreduce_cli.reduction.task import FoundSubsets, SelectionTask, run, sor
 def best_subset(task: SelectionTask) -> FoundSubsets:
     """Find the best subset of every size by branch and bound, and prove it.
 
+    The swap search gives the starts. If time or nodes run out, or on Ctrl-C, the best subset found and a lower bound of
+    the error are kept; a later run continues from there.
+
     Starts from what the swap search finds. When time or nodes run out, or on Ctrl-C, the best
     subset found and a lower bound of the error stand; a later run goes on from there.
     """

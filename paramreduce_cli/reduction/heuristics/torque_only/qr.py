@@ -8,7 +8,10 @@ from paramreduce_cli.reduction.task import FoundSubsets, SelectionTask, append_o
 
 
 def qr(task: SelectionTask) -> FoundSubsets:
-    """Order columns by how much of them is independent of those before.
+    """Order columns by how independent they are of the columns before.
+
+    Each step takes the column with the largest residual, or the group with the largest per column. Only W matters, not
+    the torques. Dependent columns follow in order of preference.
 
     Each step takes the column of which most is left, or the group with the most per column; it
     looks at W alone, not at the torques. Dependent columns follow in order of preference.
