@@ -46,12 +46,12 @@ class ParamreduceError(Exception):
     """An error that the user can fix.
 
     Args:
-        message: What is wrong and what would be right, without the remedy.
-        rejected: Word of the call that is wrong, as the user typed it: a path, an option's value, a setting.
+        message: Sentence on what is wrong and what would be right, without the remedy.
+        rejected: Word of the command line that is wrong, as the user typed it: a path, an option's value, a setting.
         choices: Words that would be right in its place; a choice with a number, such as ``swap:4``, is the default.
-        command: Stage, or ``run``, that fixes the error when called with the config of the call.
+        command: Stage, or ``run``, that fixes the error when called with the config of the command line.
         remedy: Sentence on what to do, for commands other than ``command``.
-        options: Option and value that the call lacks, or has wrong.
+        options: Option and value that the command line lacks, or has wrong.
     """
 
     exit_code = 2
@@ -74,7 +74,7 @@ class ParamreduceError(Exception):
         """Return the message with its remedy.
 
         Args:
-            arguments: Config and options of the call, which the command takes.
+            arguments: Config and options of the command line, which the command takes.
         """
         parts = [str(self.args[0]), self.remedy]
         if self.command:
@@ -91,7 +91,7 @@ class ConfigError(ParamreduceError):
     Args:
         message: Sentence, or the rest of a sentence about the value of the key: ``is ...``, ``has ...``.
         key: Path of the wrong value in the config; the line is looked up from this path.
-        in_file: Whether a line of a file is wrong, instead of a word of the call.
+        in_file: Whether a line of a file is wrong, instead of a word of the command line.
         fields: Fields of :class:`ParamreduceError`.
     """
 
@@ -110,7 +110,9 @@ class ConfigError(ParamreduceError):
 
 
 def prepend_key(key: Key, message: str) -> str:
-    """Return a message about a key, with the key in front."""
+    """Return a message with the key in front, as ``a.b.0: message``, or ``a.b is ...`` if the message starts with "is"
+    or "has"; without a key the message alone.
+    """
     if not key:
         return message
     separator = " " if message.startswith(("is ", "has ")) else ": "
@@ -118,7 +120,7 @@ def prepend_key(key: Key, message: str) -> str:
 
 
 class MissingConfigError(ConfigError):
-    """A call without a config where a config is needed."""
+    """A command line without a config where a config is needed."""
 
 
 class ArtifactError(ParamreduceError):
@@ -133,8 +135,8 @@ class NumericalError(ParamreduceError):
     """A calculation that the robot's description or the settings make impossible.
 
     Args:
-        message: What failed, with a remedy if the remedy needs no key.
-        cause: What stands in the way.
+        message: Sentence on what failed, with a remedy if the remedy needs no key.
+        cause: Kind of failure, by which remedies are suggested.
     """
 
     def __init__(self, message: str, cause: Cause) -> None:

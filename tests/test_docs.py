@@ -100,7 +100,8 @@ def test_every_command_and_option_is_on_its_page(generated):
 
 
 def test_every_dataset_is_described(generated, two_link_results, measured_results):
-    text = (DOCS / "artifacts.md").read_text() + generated.records_page()
+    pages = ("artifacts.md", "artifacts-logs.md")
+    text = "".join((DOCS / page).read_text() for page in pages) + generated.records_page()
     unknown = set()
     files = [*two_link_results.glob("*.h5"), *(measured_results / "results").glob("*.h5")]
     assert len(files) >= 10

@@ -48,7 +48,7 @@ def check_is_file(path: Path) -> None:
     """Raise ArtifactError if a path is a pipe or a folder; accept a path that does not exist.
 
     Raises:
-        ArtifactError: It is not a file.
+        ArtifactError: The path is a folder or the like.
     """
     if path.exists() and not path.is_file():
         raise ArtifactError(f"{path}: is not a file.")
@@ -106,7 +106,7 @@ def _explain_failure(error: Exception) -> str:
 
 
 class PatientFile:
-    """A file for HDF5 to write to that keeps the first error to itself.
+    """A file for HDF5 to write to, which stores its first error instead of raising it.
 
     HDF5 cannot close a file whose disk is full and takes the process down at its end. So
     after an error writing goes on into nothing, the file is closed in peace, and

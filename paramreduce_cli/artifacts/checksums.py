@@ -49,7 +49,7 @@ class RowChecks:
         data.attrs[_ATTRIBUTE] = np.array(self._values, dtype=np.uint64)
 
     def _end_block(self) -> None:
-        """Note the checksum of a block, and begin the next."""
+        """Store the checksum of a block, and begin the next block."""
         self._values.append(self._hash.intdigest())
         self._hash.reset()
         self._missing = self._rows
@@ -63,7 +63,7 @@ def write_checks(data: h5py.Dataset, array: np.ndarray) -> None:
 
 
 class CheckedRows:
-    """A dataset that is read in slices of rows, each compared with its checksums; one without any is read as it is.
+    """A dataset that is read in slices of rows; each slice is compared with the dataset's checksums, if there are any.
 
     Slices follow each other mostly: of the last block what was read is kept for the next one.
 
@@ -111,7 +111,7 @@ class CheckedRows:
         """Return all rows.
 
         Raises:
-            OSError: A checksum does not fit.
+            OSError: A checksum does not match.
         """
         if self.dtype.kind in _NUMBERS and self._identifier.shape is not None:
             value = np.empty(self.shape, self.dtype)
@@ -129,7 +129,7 @@ class CheckedRows:
         return values
 
     def _compare_checksums(self, values: np.ndarray, first: int) -> None:
-        """Raise OSError if a checksum does not fit."""
+        """Raise OSError if a checksum does not match."""
         assert self._checks is not None
         for k, start in enumerate(range(0, len(values), self._rows), start=first):
             found = xxhash.xxh3_64_intdigest(values[start : start + self._rows].data)

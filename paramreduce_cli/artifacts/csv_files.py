@@ -41,7 +41,7 @@ def read_csv(path: Path, *, leave_out_text: bool = False) -> NumberTable:
             then. Otherwise both are errors.
 
     Raises:
-        DataError: It is no table of numbers under headings that differ.
+        DataError: The file is no table of numbers, or two headings are equal.
         ArtifactError: The file cannot be read.
     """
     check_is_file(path)
@@ -100,7 +100,7 @@ def _find_delimiter(header: str) -> str:
 
 
 def _check_header(path: Path, header: list[str]) -> None:
-    """Raise DataError unless a line holds headings that differ."""
+    """Raise DataError unless a line holds headings that are all different."""
     if not header:
         raise DataError(f"{path}, line 1: the file is empty.")
     if all(map(_is_number, header)):

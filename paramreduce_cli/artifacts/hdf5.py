@@ -76,7 +76,7 @@ class Stamp:
 
 
 class Writer:
-    """A writer of datasets that digests what it writes.
+    """A writer of datasets that computes a digest of all that it writes.
 
     Args:
         group: Group to write to.
@@ -218,13 +218,13 @@ def write(path: Path, stamp: Stamp, fill: Callable[[Writer], None]) -> Stamp:
     Args:
         path: Destination; an older file stays until the new one is complete.
         stamp: Provenance of the artifact.
-        fill: Writes the contents.
+        fill: Function that writes the contents.
 
     Returns:
         The stamp with the digest of the contents.
 
     Raises:
-        ArtifactError: It cannot be written.
+        ArtifactError: The file cannot be written.
     """
     started = time.perf_counter()
     with replace_atomically(path) as temporary, contextlib.closing(PatientFile(temporary)) as disk:
@@ -250,7 +250,7 @@ def write_attribute(group: h5py.Group, name: str, value: Any) -> None:
 
 
 class Reader:
-    """A reader of an artifact; whatever is missing or wrong is one clear error."""
+    """A reader of an artifact; missing or wrong datasets raise ArtifactError."""
 
     def __init__(self, path: Path, file: h5py.File) -> None:
         self.path = path
@@ -314,7 +314,7 @@ class Reader:
         """Read the whole file, which compares all checksums.
 
         Raises:
-            ArtifactError: Something is damaged.
+            ArtifactError: A checksum does not match.
         """
         for name in self._attributes:
             self.read_attribute(name)
@@ -364,7 +364,7 @@ class Reader:
         """Return a dataset if its numbers are in this file and complete.
 
         Raises:
-            ArtifactError: Its numbers are in another file, or are not there.
+            ArtifactError: The dataset's numbers are in another file, or missing.
         """
         properties = dataset.get_create_plist()
         layout = properties.get_layout()
@@ -380,7 +380,7 @@ class Reader:
 
 
 class StoredRows:
-    """A numeric dataset in a file, of which forward slices are read; an array is made where one is asked for.
+    """A numeric dataset in a file, of which slices are read; it becomes an array where NumPy needs one.
 
     Args:
         reader: Reader of the file.
@@ -422,11 +422,11 @@ def open_reader(path: Path, *, command: str = "", remedy: str = "") -> Iterator[
 
     Args:
         path: The file.
-        command: Stage that makes it, for messages.
-        remedy: Sentence on what it is needed for.
+        command: Stage that makes the file, for messages.
+        remedy: Sentence on what the file is needed for.
 
     Raises:
-        ArtifactError: It is missing, truncated or no HDF5 file.
+        ArtifactError: The file is missing, truncated or no HDF5 file.
     """
     if not path.exists():
         raise make_missing_error(path, command=command, remedy=remedy)

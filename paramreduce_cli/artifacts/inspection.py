@@ -9,10 +9,10 @@ from paramreduce_cli.artifacts.hdf5 import open_reader
 
 
 def list_contents(path: Path) -> tuple[dict[str, str], list[tuple[str, str, str]]]:
-    """Return the attributes of a file, and (name, shape, type or value) of its datasets; all of them are checked.
+    """Return the attributes of a file, and name, shape, and type or value of each dataset; all checksums are compared.
 
     Raises:
-        ArtifactError: It cannot be read.
+        ArtifactError: The file cannot be read.
     """
     datasets: list[tuple[str, str, str]] = []
 

@@ -44,8 +44,8 @@ def load_log(path: Path) -> RawLog:
             matrices, whose columns are numbered from 1; a ROS 2 bag, as a folder or a file.
 
     Raises:
-        DataError: It holds no columns of numbers.
-        ArtifactError: It cannot be read.
+        ArtifactError: The file cannot be read.
+        DataError: The log holds no columns of numbers.
     """
     if path.is_dir() or path.suffix in _BAGS:
         return _load_bag(path)
@@ -80,7 +80,7 @@ def _classify_dataset(item: Any) -> str:
 
 
 def _read_columns(rows: Any) -> FloatArray:
-    """Return rows, (n_rows,) or (n_rows, n), as a matrix of columns, read some rows at a time."""
+    """Return an array, (n_rows,) or (n_rows, n), as a matrix of contiguous columns; it is read some rows at a time."""
     result = allocate_matrix(rows.shape[0], rows.shape[1] if rows.ndim == 2 else 1)
     for start in range(0, len(result), _AT_ONCE):
         some = rows[start : start + _AT_ONCE]
@@ -112,7 +112,7 @@ def _iterate_members(
 
     Args:
         archive: The file.
-        others: What other arrays hold is added, by name.
+        others: Mapping to which a description of each array without numbers is added, by name.
 
     Raises:
         ValueError: An array is shorter or longer than its header says.
@@ -151,7 +151,7 @@ def _split_columns(
     Args:
         path: The file.
         matrices: Names and arrays, (n_rows, n_columns) each.
-        others: What datasets without numbers hold, by name.
+        others: Descriptions of the datasets without numbers, by name.
 
     Raises:
         DataError: There are no numbers, or a matrix has its samples in columns.

@@ -12,7 +12,9 @@ import numpy as np
 
 
 def to_plain(value: Any) -> Any:
-    """Return a record, or a part of it, as lists, mappings, texts and numbers."""
+    """Return a record, or a part of it, as lists, mappings, texts and numbers: members of enums by name, numbers that
+    are not finite as texts. Everything else stays as it is.
+    """
     if dataclasses.is_dataclass(value):
         return {f.name: to_plain(getattr(value, f.name)) for f in dataclasses.fields(value)}
     if isinstance(value, Enum):

@@ -75,7 +75,7 @@ def read_summary_stamp(path: Path) -> Stamp | None:
     """Return the stamp of a summary, or None if it has none.
 
     Raises:
-        ArtifactError: It is missing, damaged, or no summary.
+        ArtifactError: The summary is missing, damaged, or no summary.
     """
     return _get_stamp(load_summary(path))
 
@@ -89,12 +89,14 @@ def _get_stamp(summary: Any) -> Stamp | None:
 
 
 def load_summary(path: Path) -> dict[str, Any]:
-    """Read a summary, or that of a results folder, and compare it with its digest if it has one.
+    """Read a summary, given its path or a results folder, and compare it with its digest.
+
+    A summary without provenance, which somebody made by hand, has no digest.
 
     One that somebody made has none, and then no provenance at all.
 
     Raises:
-        ArtifactError: It is missing, damaged, or no summary.
+        ArtifactError: The summary is missing, damaged, or no summary.
     """
     if path.is_dir():
         path /= SUMMARY
@@ -114,7 +116,7 @@ def list_newer_artifacts(results: Path) -> list[str]:
     """Return the artifacts of a results folder that have changed since its report was made.
 
     Raises:
-        ArtifactError: The summary is missing or damaged, or one of them is no HDF5 file.
+        ArtifactError: The summary is missing or damaged, or an artifact is no HDF5 file.
     """
     stamp = read_summary_stamp(results / SUMMARY)
     found = []
@@ -127,7 +129,7 @@ def list_newer_artifacts(results: Path) -> list[str]:
 
 
 def _is_whole(summary: Mapping[str, Any]) -> bool:
-    """Return whether the digest fits; without provenance, whether no damaged key looks like one."""
+    """Return whether the digest matches; without provenance, whether no key looks like a damaged one."""
     if "provenance" not in summary:
         return not any(isinstance(entry, dict) and "digest" in entry for entry in summary.values())
     stamp = _get_stamp(summary)
@@ -138,7 +140,7 @@ def verify_report(path: Path) -> None:
     """Compare a summary, and the files it lists, with their digests.
 
     Raises:
-        ArtifactError: One of them is missing, damaged or changed.
+        ArtifactError: A file is missing, damaged or changed.
     """
     listed = load_summary(path).get("files")
     if not isinstance(listed, dict):
@@ -169,7 +171,7 @@ def load_json(path: Path) -> Any:
     """Read a JSON file.
 
     Raises:
-        ArtifactError: It is missing or not JSON.
+        ArtifactError: The file is missing or not JSON.
     """
     check_is_file(path)
     try:

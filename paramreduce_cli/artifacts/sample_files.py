@@ -57,7 +57,7 @@ _GENERALISED = ("q", "dq", "ddq")
 
 
 def save_sample_set(writer: Writer, name: str, sample_set: SampleSet) -> None:
-    """Write one set; compute its triangular factors unless the parts of the set have them."""
+    """Write one set; its triangular factors are computed unless its parts have stored them."""
     known = sample_set.compute_factors() if isinstance(sample_set, JoinedSet) else None
     accumulator = FactorAccumulator()
     appenders: dict[str, Any] = {}
@@ -75,7 +75,7 @@ def save_sample_set(writer: Writer, name: str, sample_set: SampleSet) -> None:
 
 
 def _iterate_blocks(sample_set: SampleSet, known_factors: FloatArray | None) -> Iterator[Block]:
-    """Yield the samples, without observation matrices if these are neither kept nor needed."""
+    """Yield the samples, without observation matrices if neither the file nor the factors need these."""
     if isinstance(sample_set, JoinedSet) and known_factors is not None:
         _, n_dof, k, _ = known_factors.shape
         if _is_matrix_omitted(sample_set, n_dof, k - 1):
@@ -158,10 +158,10 @@ class StoredSet:
 
     @cached_property
     def _dynamics(self) -> Dynamics:
-        """Dynamics of the model that the samples were computed with.
+        """Dynamics of the model with which the samples were computed.
 
         Raises:
-            ArtifactError: It is not next to the file.
+            ArtifactError: The file of the model is not in the same folder.
         """
         path = self._path.with_name(_MODEL)
         if self._path.parent.suffix == ITEMS:

@@ -137,7 +137,7 @@ class Store:
             wait: Whether to wait for another run instead of raising an error.
 
         Raises:
-            ArtifactError: Another run is in it.
+            ArtifactError: Another run is in the folder.
         """
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
@@ -174,7 +174,7 @@ def load_file(path: Path, record: type, robot: str | None, maker: str) -> tuple[
         maker: Command that makes it, for messages.
 
     Raises:
-        ArtifactError: It is missing, damaged, of another robot or of another schema.
+        ArtifactError: The file is missing, damaged, of another robot or of another schema.
     """
     with open_reader(path, command=maker) as reader:
         stamp = read_stamp_from(reader)
@@ -196,7 +196,7 @@ def check_schema(path: Path, stamp: Stamp) -> None:
     """Refuse a file of another layout.
 
     Raises:
-        ArtifactError: It is of an older or newer schema.
+        ArtifactError: The file is of an older or newer schema.
     """
     if stamp.schema != SCHEMA:
         age = "an older" if stamp.schema < SCHEMA else "a newer"
@@ -212,7 +212,7 @@ def digest_file(path: Path) -> str:
     """Return the SHA-256 of a file's bytes.
 
     Raises:
-        ArtifactError: It cannot be read.
+        ArtifactError: The file cannot be read.
     """
     if not path.is_dir():
         check_is_file(path)

@@ -32,7 +32,7 @@ class StoredItems(MutableMapping[str, Any]):
 
     Args:
         path: Path of the artifact that the items belong to.
-        stamp: Returns the provenance of an item, given the seconds that it took.
+        stamp: Function that returns the stamp of an item, given the seconds that the item took.
         from_start: Whether items of earlier runs count as absent.
         check: Called before an item is written; raises a KeyboardInterrupt that a library swallowed, which may
             have spoilt the item.

@@ -13,7 +13,7 @@ from paramreduce_cli import __version__
 from paramreduce_cli.cli.commands import commands
 from paramreduce_cli.cli.next_steps import describe_next_steps
 from paramreduce_cli.cli.suggestions import (
-    Call,
+    CommandLine,
     UnknownCommandError,
     describe_error,
     describe_usage_error,
@@ -45,7 +45,7 @@ def main() -> None:
     try:
         code = _call_command()
     except ParamreduceError as error:
-        show_errors(describe_error(error, _call()))
+        show_errors(describe_error(error, read_command_line()))
         if further := _suggest(suggest_after_error, error):
             print_error(further)
         code = error.exit_code
@@ -76,18 +76,18 @@ def main() -> None:
     sys.exit(code if isinstance(code, int) else 0)
 
 
-def _suggest(suggest: Callable[[Any, Call], str], error: Exception) -> str:
+def _suggest(suggest: Callable[[Any, CommandLine], str], error: Exception) -> str:
     """Return a suggestion; nothing where the folder cannot be looked at."""
     try:
-        return suggest(error, _call())
+        return suggest(error, read_command_line())
     except OSError:
         return ""
 
 
-def _call() -> Call:
-    """Return the words of this call, and the command that they name."""
+def read_command_line() -> CommandLine:
+    """Return the words of the command line, and the command that they name."""
     name = next((word for word in cli.words if not word.startswith("-")), "")
-    return Call(cli.words, cli.get_command(click.Context(cli), name))
+    return CommandLine(cli.words, cli.get_command(click.Context(cli), name))
 
 
 def _call_command() -> object:
@@ -107,7 +107,7 @@ class _Commands(click.Group):
     """The group of all commands, each imported when it is called."""
 
     words: Sequence[str] = ()
-    """Words of the call after the name of the program."""
+    """Words of the command line after the name of the program."""
 
     def make_context(
         self,
@@ -116,7 +116,7 @@ class _Commands(click.Group):
         parent: click.Context | None = None,
         **extra: Any,
     ) -> click.Context:
-        """Note the words of the call before click takes them apart."""
+        """Note the words of the command line before click takes them apart."""
         self.words = tuple(args)
         return super().make_context(info_name, args, parent, **extra)
 

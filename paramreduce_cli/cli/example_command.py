@@ -21,11 +21,11 @@ class ExampleCommand(click.Command):
     """A command with an example.
 
     Args:
-        arguments: As for click.
+        arguments: Positional arguments, as click takes them.
         example: Call without ``paramreduce``; ``{config}``, ``{results}`` and ``{results_2}`` stand for what is in the
             folder.
         config: Config of the example in the help.
-        options: As for click.
+        options: Keyword arguments, as click takes them.
     """
 
     def __init__(
@@ -36,7 +36,7 @@ class ExampleCommand(click.Command):
         self.help = f"{inspect.cleandoc(self.help or '')}\n\nExample: {self._fill({})}"
 
     def _fill(self, values: dict[str, str]) -> str:
-        """Return the example with what is found, and with the robot of the help for the rest."""
+        """Return the example with these values filled in, and with the robot of the help for the rest."""
         names = {
             "config": f"configs/{self._robot}.yaml",
             "results": f"results/{self._robot}",
@@ -45,10 +45,11 @@ class ExampleCommand(click.Command):
         return f"paramreduce {self._example.format(**names | values)}"
 
     def show_example(self, words: Sequence[str]) -> str:
-        """Return the example with what is in this folder, or with what to do first; empty where too little is here.
+        """Return the example with the config or results of this folder, or the command to run first; empty if the
+        folder has neither.
 
         Args:
-            words: Words of the call, whose configs come first.
+            words: Words of the command line; the configs among them come first.
         """
         names = {name for _, name, _, _ in Formatter().parse(self._example) if name}
         configs, results = _list_projects(words)
@@ -66,7 +67,7 @@ class ExampleCommand(click.Command):
 
 
 def _list_projects(words: Sequence[str]) -> tuple[list[Path], list[Path]]:
-    """Return configs and results of this folder, those of the call first."""
+    """Return configs and results of this folder; those on the command line come first."""
     own = [path for path in map(Path, words) if path.suffix in (".yaml", ".yml") and path.is_file()]
     configs = list(dict.fromkeys([*own, *list_configs(Path())]))
     finished = [results for results in map(get_results_path, own) if has_report(results)]

@@ -10,10 +10,10 @@ from paramreduce_cli.running.runner import Runner
 
 
 def load_current(config: Config | None, store: Store, record: type) -> Any:
-    """Return a record if it fits the config, as code for a controller must be of the current config.
+    """Return a record if its file is of the current config, as code for a controller must be.
 
     Raises:
-        ArtifactError: It is missing, or was made from something else.
+        ArtifactError: The file is missing, or was made with another config.
     """
     robot = config.robot if config is not None else None
     found = load_file(store.get_path(record), record, robot, find_maker(record).name)[0]

@@ -43,7 +43,7 @@ def describe_next_steps(folder: Path) -> list[str]:
 
 
 def _describe_results(folder: Path) -> list[str]:
-    """Return lines for a folder of results."""
+    """Return lines that list results and say what to type next, for a folder of results."""
     if not has_report(folder):
         return []
     return [
@@ -56,7 +56,7 @@ def _describe_results(folder: Path) -> list[str]:
 
 
 def _describe_parent(folder: Path) -> list[str]:
-    """Return lines for a folder below the one with the configs."""
+    """Return lines that say how to change to the folder with the configs, if this folder is below it."""
     above = find_project_above(folder)
     if above is None:
         return []

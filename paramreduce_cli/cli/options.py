@@ -65,7 +65,7 @@ def count_cores() -> int:
 
 
 def make_store(config: Config | None, results: Path | None) -> Store:
-    """Return the results folder of a config, or the folder that the call names.
+    """Return the results folder of a config, or the folder that the command line names.
 
     Raises:
         MissingConfigError: There is neither a config nor a folder.

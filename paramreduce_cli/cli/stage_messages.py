@@ -13,7 +13,7 @@ def say_outcome(outcome: Outcome) -> None:
 
 
 def say_verdict(accepted: bool | None, verdict: str, quiet: bool) -> int:
-    """Say whether the selected model is accepted; returns the exit code."""
+    """Print whether the selected model is accepted; return the exit code."""
     if accepted is False:
         print_error(f"Not accepted: {verdict}")
         return NOT_ACCEPTED

@@ -1,4 +1,4 @@
-"""Suggestions of what to type after a call that fails, from the error and the folder."""
+"""Suggestions of what to type after a command line that fails, from the error and the folder."""
 
 import difflib
 import shlex
@@ -29,8 +29,8 @@ _RANGE, _OR = "...", "|"
 
 
 @dataclass(frozen=True)
-class Call:
-    """A call of the program."""
+class CommandLine:
+    """A parsed command line."""
 
     words: Sequence[str]
     """Words after ``paramreduce``."""
@@ -39,7 +39,7 @@ class Call:
 
 
 class UnknownCommandError(click.UsageError):
-    """A command that there is not.
+    """An error about a command that does not exist.
 
     Args:
         name: Name that was typed.
@@ -59,14 +59,14 @@ class UnknownCommandError(click.UsageError):
         super().__init__(f"there is no command {name!r}; {hint}", context)
 
 
-def describe_error(error: ParamreduceError, call: Call) -> str:
-    """Return the message of an error, whose commands have the arguments of the call."""
+def describe_error(error: ParamreduceError, call: CommandLine) -> str:
+    """Return the message of an error, whose commands have the arguments of the command line."""
     return error.describe(
         _keep_config_arguments(call.words) or _guess_config(error.rejected) or "CONFIG"
     )
 
 
-def suggest_after_error(error: ParamreduceError, call: Call) -> str:
+def suggest_after_error(error: ParamreduceError, call: CommandLine) -> str:
     """Return lines that say what to type next; empty where the error says it."""
     words = list(call.words)
     if not words:
@@ -81,8 +81,8 @@ def suggest_after_error(error: ParamreduceError, call: Call) -> str:
     return f"{'Then again' if corrected == words else 'Next'}: {_format_call(corrected)}"
 
 
-def suggest_after_usage_error(error: click.ClickException, call: Call) -> str:
-    """Return lines that say what to type after a call that click cannot read."""
+def suggest_after_usage_error(error: click.ClickException, call: CommandLine) -> str:
+    """Return lines that say what to type after a command line that click rejects."""
     words = list(call.words)
     meant = ""
     if isinstance(error, click.NoSuchOption) and call.command is not None:
@@ -99,13 +99,13 @@ def suggest_after_usage_error(error: click.ClickException, call: Call) -> str:
 
 
 def describe_usage_error(error: click.ClickException) -> str:
-    """Return the message of a call that click cannot read; click guesses options by their spelling alone."""
+    """Return the message of a command line that click rejects; click guesses options by their spelling alone."""
     if isinstance(error, click.NoSuchOption) and error.ctx and error.ctx.parent:
         return f"there is no option {error.option_name}."
     return error.format_message()
 
 
-def show_example(call: Call) -> str:
+def show_example(call: CommandLine) -> str:
     """Return an example of the command with what is in this folder, and where to read more."""
     command = call.command
     if command is None:
@@ -124,7 +124,7 @@ def _format_call(words: Sequence[str]) -> str:
 
 
 def _insert_config(words: Sequence[str]) -> str:
-    """Return the call with the first config here; empty where there is none, or samples are given."""
+    """Return the command line with the first config here; empty where there is none, or samples are given."""
     here = list_configs(Path())
     if not here or any(word.startswith("--samples") for word in words):
         return ""
@@ -132,7 +132,7 @@ def _insert_config(words: Sequence[str]) -> str:
 
 
 def _suggest_other_place(error: ParamreduceError, words: list[str]) -> str:
-    """Return the call with what the user means by a path or a name that is rejected."""
+    """Return the command line with what the user means by a path or a name that is rejected."""
     if isinstance(error, MissingConfigError):
         return _insert_config(words)
     if words[0] == "init" and len(words) == 2:
@@ -142,7 +142,7 @@ def _suggest_other_place(error: ParamreduceError, words: list[str]) -> str:
 
 
 def _suggest_meant_place(rejected: str, words: list[str]) -> str:
-    """Return the call with the config, the results or the folder that a typed word stands for."""
+    """Return the command line with the config, the results or the folder that a typed word stands for."""
     word = next((w for w in words if rejected in (w, w.rstrip("/"))), None)
     if word is None:
         return ""
@@ -156,7 +156,7 @@ def _suggest_meant_place(rejected: str, words: list[str]) -> str:
 
 
 def _replace_by_other_kind(word: str, words: list[str]) -> list[str] | None:
-    """Return the call with a config for results, or results for a config, or a robot's name; None if there is no such
+    """Return the command line with a config for results, or results for a config, or a robot's name; None if there is no such
     file.
     """
     config, results = guess_config(word), guess_results(word)
@@ -172,7 +172,7 @@ def _replace_by_other_kind(word: str, words: list[str]) -> list[str] | None:
 
 
 def _correct_robot_name(word: str, words: list[str]) -> list[str] | None:
-    """Return the call with the config whose name is like a robot's name that was typed, or None."""
+    """Return the command line with the config whose name is like a robot's name that was typed, or None."""
     if words[0] not in (*stages, *_OF_CONFIGS) or Path(word).name != word or Path(word).suffix:
         return None
     here = {path.stem: path for path in list_configs(Path())}
@@ -181,7 +181,7 @@ def _correct_robot_name(word: str, words: list[str]) -> list[str] | None:
 
 
 def _suggest_example(word: str) -> str:
-    """Return the call that copies the example of a robot's name; empty where there is none."""
+    """Return the command line that copies the example of a robot's name; empty where there is none."""
     from paramreduce_cli.config.examples import list_examples  # late: it loads much
 
     name = Path(word).name.removesuffix(".yaml")
@@ -189,7 +189,7 @@ def _suggest_example(word: str) -> str:
 
 
 def _correct_call(error: ParamreduceError, words: list[str]) -> list[str] | None:
-    """Return the call with a choice or an option of the error; None where the error has none."""
+    """Return the command line with a choice or an option of the error; None where the error has none."""
     if error.choices:
         return _replace_word(
             words, error.rejected, find_nearest_choice(error.rejected, error.choices)
@@ -279,7 +279,7 @@ def _guess_config(rejected: str) -> str:
 
 
 def _keep_config_arguments(words: Sequence[str]) -> str:
-    """Return the config of a call, and the options that change it or say where its results are."""
+    """Return the config of a command line, and the options that change it or say where its results are."""
     kept: list[str] = []
     following = False
     for word in words[1:]:

@@ -62,8 +62,8 @@ class Journal:
         """Append to a file from now on.
 
         Raises:
-            ConfigError: It cannot be written, or holds something else.
-            ArtifactError: It is not a file.
+            ConfigError: The file cannot be written, or holds something else.
+            ArtifactError: The path is no file.
         """
         check_is_file(path)
         try:
@@ -105,7 +105,9 @@ VERBOSE = click.option(
 
 
 def say(message: str) -> None:
-    """Print to standard output, without markup."""
+    """Print to standard output, without markup and with control characters spelled out, and to the log file if there is
+    one.
+    """
     journal.note(message)
     out.print(escape_controls(message), markup=False)
 
@@ -189,7 +191,7 @@ class Interruption:
         """Forget a Ctrl-C that has ended a search, not the work.
 
         Raises:
-            KeyboardInterrupt: It was a kill, which asks for an end of all.
+            KeyboardInterrupt: The signal was SIGTERM, which ends the whole run.
         """
         if self._met == signal.SIGTERM:
             raise KeyboardInterrupt

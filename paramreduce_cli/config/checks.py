@@ -75,7 +75,7 @@ def _check_payloads_and_drives(config: Config) -> Iterator[Problem]:
 
 
 def _check_tracking(config: Config) -> Iterator[Problem]:
-    """Yield problems of the simulated control."""
+    """Yield problems of the simulated control, which needs the torques of all joints and an open tree."""
     if config.report.tracking is not None and config.unmeasured:
         yield ("report", "tracking"), "needs the torques of all joints; remove it"
     if config.report.tracking is not None and config.description.bodies.closed:
@@ -237,7 +237,7 @@ def _name_coordinates(config: Config) -> str:
 
 
 def _check_limits(config: Config) -> Iterator[Problem]:
-    """Yield problems of position limits."""
+    """Yield problems of position limits, and of numbers of points, harmonics and starts that do not fit each other."""
     for k, (lower, upper) in enumerate(config.trajectories.position_limits):
         path: Key = ("trajectories", "position_limits")
         if len(config.trajectories.position_limits) > 1:
@@ -265,7 +265,7 @@ def _check_limits(config: Config) -> Iterator[Problem]:
 
 
 def _check_acceptance(config: Config) -> Iterator[Problem]:
-    """Yield limits of errors on a test set if the config leads to no test set."""
+    """Yield problems of limits of errors on a test set, if the config leads to no test set."""
     sampling, motions = config.sampling, config.trajectories
     if sampling.test_file is not None:
         return
@@ -381,7 +381,7 @@ def _warn_of_limits(config: Config) -> Iterator[str]:
 
 
 def _warn_of_terms(config: Config) -> Iterator[str]:
-    """Yield budgets that restrict nothing."""
+    """Yield warnings about budgets that restrict nothing."""
     terms = config.terms
     if (
         terms is not None
@@ -392,7 +392,7 @@ def _warn_of_terms(config: Config) -> Iterator[str]:
 
 
 def _warn_of_drives(config: Config) -> Iterator[str]:
-    """Yield drives with unknown or impossible values."""
+    """Yield warnings about drives with unknown or impossible values."""
     sampling = config.sampling
     missing = {name: drive.list_unknown() for name, drive in config.list_drives().items()}
     found = [f"{' and '.join(keys)} of {name}" for name, keys in missing.items() if keys]

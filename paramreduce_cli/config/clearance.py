@@ -42,7 +42,7 @@ class PlaneSection(Section):
 
 
 class ClearanceSection(Section):
-    """A demand that bodies keep distances from each other and from planes.
+    """A set of distances that bodies must keep from each other and from planes.
 
     By default every body is a capsule from its own joint to the next.
     """
@@ -64,7 +64,7 @@ class ClearanceSection(Section):
         """Yield a constraint for each pair of bodies, and for each body and plane.
 
         Raises:
-            ConfigError: Bodies are named that there are not.
+            ConfigError: A named body does not exist.
         """
         spheres = self._cover_bodies(mechanism)
         ignored = {frozenset(pair) for pair in self.ignore}
@@ -120,7 +120,7 @@ class ClearanceSection(Section):
 
 
 def _cover_capsule(ends: FloatArray, radius: float) -> tuple[FloatArray, FloatArray]:
-    """Return spheres that cover a capsule, a radius apart and slightly larger, so that nothing shows between them."""
+    """Return spheres, a radius apart and slightly larger, that cover a capsule completely."""
     length = float(np.linalg.norm(ends[1] - ends[0]))
     count = int(np.ceil(length / radius)) + 1
     half = length / max(1, count - 1) / 2

@@ -119,7 +119,9 @@ def _normalise(name: str) -> str:
 
 
 def _match_numbered(names: Sequence[str], words: Sequence[str], n: int) -> str | list[str] | None:
-    """Return a pattern if joints count from 1, a list if they count from 0, None if no columns fit."""
+    """Return the columns of n numbered joints: a pattern if numbers begin at 1, a list if they begin at 0, None if no
+    columns fit.
+    """
     known = set(names)
     stems = {match[1] for name in names if (match := re.fullmatch(r"(.*?)\[?(\d+)\]?", name))}
     for stem in sorted(stems, key=lambda stem: (_rank_stem(stem, words), stem)):

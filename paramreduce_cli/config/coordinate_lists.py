@@ -30,7 +30,9 @@ def read_per_joint(config: Config, key: tuple[str, ...]) -> Any:
 
 
 def cut_to_independent(config: Config) -> Config:
-    """Take the entries of the independent coordinates where a list has one for every coordinate of the loops."""
+    """Return the config with lists for the independent coordinates only, where a list had one entry for every
+    coordinate of the loops.
+    """
     bodies = config.description.bodies
     if not bodies.closed:
         return config

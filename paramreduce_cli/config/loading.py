@@ -83,7 +83,7 @@ def load_settings(path: Path | None, overrides: Sequence[str] = ()) -> Settings:
         overrides: ``key.key=value`` texts that replace what the file says.
 
     Raises:
-        ConfigError: As for :func:`load_config`.
+        ConfigError: The overrides are wrong, as for :func:`load_config`.
     """
     document = yaml_reading.read_yaml("{}", "settings") if path is None else _read_document(path)
     try:
@@ -102,7 +102,7 @@ def load_section(path: Path, kind: type[S]) -> S:
         kind: Type of the section.
 
     Raises:
-        ConfigError: As for :func:`load_config`.
+        ConfigError: The file cannot be read or has wrong keys, as for :func:`load_config`.
     """
     return _validate_section(_read_document(path), kind)
 
@@ -138,7 +138,7 @@ def locate_errors(path: Path | None, overrides: Sequence[str] = ()) -> Iterator[
 
     Args:
         path: The config's file; without one errors stay as they are.
-        overrides: As for :func:`load_config`.
+        overrides: Settings of the command line, as for :func:`load_config`.
     """
     try:
         yield
@@ -212,7 +212,9 @@ def _make_no_mapping_error(path: Path) -> ConfigError:
 
 
 def _correct_setting(document: Document, problems: list[Problem]) -> tuple[str, list[str]]:
-    """Return the setting of the call that has an unknown name, and its correction; nothing if no name is near."""
+    """Return the setting of the command line that has an unknown name, and its correction; nothing if no known name is
+    similar.
+    """
     if len(problems) != 1:
         return "", []
     ((path, error),) = problems
@@ -234,7 +236,7 @@ def _correct_setting(document: Document, problems: list[Problem]) -> tuple[str, 
 
 
 def _replace_item(value: str, place: Key, name: str) -> str:
-    """Return a value as it was typed, with another name at a place in it; an empty place means the value itself."""
+    """Return a value as it was typed, with another name at a position in it; an empty position means the value itself."""
     if not place:
         return name
     items = yaml.safe_load(value)
@@ -277,7 +279,7 @@ def _parse_config(data: dict[str, Any], constants: dict[str, float]) -> Config:
 
 
 def _merge_by_key(problems: list[Problem]) -> list[Problem]:
-    """Return one problem for each key; a value that fits no member of a union has one for each member before."""
+    """Return one problem for each key; pydantic gives one for each member of a union that does not fit."""
     found: dict[Key, list[str | UnknownNameError]] = {}
     for path, message in problems:
         found.setdefault(path, []).append(message)
@@ -387,7 +389,7 @@ def _format_problem(document: Document, problem: Problem) -> str:
 
 
 def _drop_unused_tests(config: Config) -> Config:
-    """Return the config without test trajectories by default if a recording is the test set."""
+    """Return the config without the default test trajectories if a recording is the test set."""
     defaults = {"test_count": 0, "test_point_to_point_count": 0}
     update = {k: n for k, n in defaults.items() if k not in config.trajectories.model_fields_set}
     if config.sampling.test_file is None or not update:

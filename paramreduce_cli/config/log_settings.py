@@ -62,7 +62,7 @@ class UnitsSection(Section):
 
 
 class SignsSection(Section):
-    """The signs of joints (or motors) whose motion and torque count differently."""
+    """The signs of joints (or motors) whose motion and torque have different signs."""
 
     motion: PerJoint = [1.0]
     """1, or -1 for motions that were counted the other way."""
@@ -146,7 +146,7 @@ class LogSection(Section):
         """Return the motor positions per joint position, (n_dof, n_dof), or None if joints were recorded.
 
         Raises:
-            ValueError: Its shape does not fit, or it has no inverse.
+            ValueError: The matrix has another size, or no inverse.
         """
         if self.transmission is None:
             return None

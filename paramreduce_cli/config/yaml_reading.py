@@ -97,7 +97,7 @@ def _check_depth(text: str) -> None:
 
 
 def _count_values(node: yaml.Node, counts: dict[int, int], depth: int) -> int:
-    """Raises yaml.YAMLError: The aliases are nested too deeply."""
+    """Return the number of values in a YAML node, where an aliased node counts as often as it is used."""
     if depth > _DEEPEST:
         raise yaml.YAMLError(_TOO_DEEP)
     if id(node) not in counts:

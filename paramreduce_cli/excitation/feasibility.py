@@ -39,7 +39,7 @@ def find_resting_position(
         preferred: Coordinates from which to search first, (n_dof,).
 
     Raises:
-        NumericalError: There is none to be found; says which bound stands in the way.
+        NumericalError: No such position is found; the message names the bound that is exceeded.
     """
     mechanism = excitation.coordinates.mechanism
     middle, reach = limits.middle, _INSET * margin * limits.reach

@@ -177,7 +177,7 @@ def _compute_smooth_maximum(
         used: Magnitudes, (n_dof, n_points).
         fractions: Harmonics to what ``used`` is the magnitude of, (n_dof, n_points, 2 harmonics).
         norm: The exponent.
-        signs: Of what ``used`` is the magnitude of.
+        signs: Signs of the values whose magnitudes are ``used``.
     """
     largest = np.maximum(used.max(axis=1, keepdims=True), np.finfo(float).tiny)
     ratio = used / largest

@@ -52,7 +52,7 @@ def evaluate_along(motions: Sequence[PointToPoint], points: int, finer: int) -> 
     Args:
         motions: The motions.
         points: Number of samples of each motion.
-        finer: How many times finer the grid is on which loops are followed; 1 where there are none.
+        finer: Factor by which the grid on which loops are followed is finer; 1 without loops.
     """
 
     def at(span: Span) -> StateBlock:

@@ -45,7 +45,7 @@ def generate_group(given: Sequence[Sequence[str]], names: Sequence[str]) -> list
         names: Names of the independent coordinates, (n_dof,).
 
     Raises:
-        NumericalError: They generate too many.
+        NumericalError: The group has too many elements.
     """
     generators = [
         Symmetry(

@@ -156,7 +156,7 @@ def _describe_accuracy(
 
 
 def _describe_origin(mechanism: Mechanism, origin: str) -> tuple[str, str]:
-    """Return the gravity that the model holds under, and what made it."""
+    """Return sentences on the gravity that the model assumes, and on what made the model."""
     gravity = " ".join(f"{g:.6g}" for g in mechanism.gravity)
     return (
         f"Gravity in the base frame, m/s^2: {gravity}",
@@ -181,7 +181,7 @@ def _describe_frames(mechanism: Mechanism) -> tuple[str, ...]:
 
 
 def _list_values(model: Model, chosen: ReducedModel) -> tuple[ParameterValue, ...]:
-    """Return the values of the parameters with units."""
+    """Return the parameters of the model with values and units."""
     units = chosen.list_units(model.mechanism.parameters)
     found = zip(chosen.names, chosen.values.tolist(), units, chosen.expressions, strict=True)
     return tuple(ParameterValue(*one) for one in found)

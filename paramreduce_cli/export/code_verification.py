@@ -112,12 +112,12 @@ def check(
 
     Args:
         functions: Functions to be checked.
-        stored: Their arguments and expected results, (n_states, ...) by name.
+        stored: Arguments of the functions and expected results, (n_states, ...) by name.
         least: Smallest sizes that results are judged by, by name.
         tolerance: Share of the size of each result that is allowed.
 
     Raises:
-        FormulationError: They are not the same.
+        FormulationError: A result differs from the expected one.
     """
     for function in functions:
         for name, got in _evaluate_function(function, stored).items():
@@ -182,7 +182,7 @@ def check_closures(
         least: Smallest sizes that results are judged by, by name.
 
     Raises:
-        FormulationError: They are not.
+        FormulationError: The functions of the loops give wrong results.
     """
     values: dict[str, FloatArray] = {}
     for function in closures:

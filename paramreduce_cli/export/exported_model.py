@@ -24,7 +24,7 @@ class ParameterValue:
 
 @dataclass(frozen=True)
 class ExportedModel:
-    """A reduced model with everything that its code says about it."""
+    """A reduced model with all information that its code and comments contain."""
 
     robot: str
     heading: tuple[str, ...]
@@ -112,7 +112,9 @@ def make_identifier(name: str) -> str:
 
 
 def make_harmless(text: str) -> str:
-    """Return text that cannot end a comment or a string: printable, without quotes, backslashes and */."""
+    """Return text that cannot end a comment or a string in double quotes: double quotes become apostrophes, backslashes
+    become slashes, and */, /* and ??? are split by blanks.
+    """
     kept = "".join(c if c.isprintable() else " " for c in text)
     for bad, good in (("\\", "/"), ('"', "'"), ("*/", "* /"), ("/*", "/ *"), ("???", "? ? ?")):
         kept = kept.replace(bad, good)

@@ -45,7 +45,7 @@ def find_chosen_model(
         identification: Identified models; needed for these alone.
 
     Raises:
-        ConfigError: There is none of that name.
+        ConfigError: There is no model of this name.
     """
     if text == FULL and model is not None:
         return make_full_model(model), "full model"
@@ -120,7 +120,7 @@ def find_pruned_model(terms: TermReduction, name: str) -> tuple[ReducedModel, Te
         name: ``inverse`` or ``direct``.
 
     Raises:
-        ConfigError: It was not simplified.
+        ConfigError: The function has not been pruned.
     """
     term = terms.functions.get(name)
     if term is None:

@@ -28,7 +28,7 @@ def write_robot_file(
         config: Config that names the robot's file.
         model: Model of the robot.
         standard: Standard parameters that are written, (n_parameters,).
-        kind: One of :data:`paramreduce_cli.importing.formats.formats`, which the file must be of.
+        kind: Format, one of :data:`paramreduce_cli.importing.formats.formats`; the robot's file must have it.
 
     Raises:
         ConfigError: The file is unknown, or no longer the robot of the config, or has no form for
@@ -108,7 +108,7 @@ def _make_inertial(name: str, body: FloatArray) -> Inertial | None:
 
 
 def _sum_drives(mechanism: Mechanism, standard: FloatArray) -> dict[str, dict[str, float]]:
-    """Return what acts on the joint of each body, by the keys of a drive in a config.
+    """Return the sums of the drives' parameters that act on the joint of each body, by the keys of a drive in a config.
 
     Of drives along one coordinate, seen from that: with a weight w, inertia, friction and stiffness of
     a drive are w^2 times as large there, Coulomb friction w times.
@@ -131,10 +131,10 @@ def _sum_drives(mechanism: Mechanism, standard: FloatArray) -> dict[str, dict[st
 def _warn_of_losses(
     mechanism: Mechanism, standard: FloatArray, bodies: dict[str, FloatArray], form: RobotFormat
 ) -> None:
-    """Warn of bodies that cannot exist, and of what the file cannot hold.
+    """Warn about physically impossible bodies, and about parameters that the file cannot hold.
 
     Raises:
-        ConfigError: Bodies cannot exist, and the format refuses them.
+        ConfigError: Bodies are physically impossible, and the format rejects such bodies.
     """
     unphysical = [name for name, body in bodies.items() if not is_positive_semidefinite(body)]
     if unphysical and form.physical:

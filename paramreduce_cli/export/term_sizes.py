@@ -18,7 +18,7 @@ _SMALLEST = 1e-300
 def estimate_term_sizes(
     mechanism: Mechanism, model: ReducedModel, stored: Mapping[str, FloatArray]
 ) -> dict[str, float]:
-    """Estimate the smallest size that each result is judged by.
+    """Estimate a lower bound of the magnitude of each result, which errors are divided by.
 
     Args:
         mechanism: The robot.
@@ -60,7 +60,7 @@ def _assign_by_kind(mechanism: Mechanism, mass: float, moment: float, inertia: f
 
 
 def find_entry_sizes(name: str, expected: FloatArray, least: float) -> FloatArray:
-    """Return the size by which each entry of a result is judged.
+    """Return the magnitude that errors of each entry of a result are divided by.
 
     Args:
         name: Name of the result.

@@ -118,7 +118,7 @@ def keep(built: Path, library: Path) -> None:
     """Move a new library into the cache atomically, and remove old ones.
 
     Raises:
-        OSError: It cannot be written.
+        OSError: The folder cannot be written to.
     """
     with built.open("r+b") as file:
         digest = hashlib.sha256(file.read()).digest()

@@ -77,7 +77,7 @@ class BatchFunction:
         """Evaluate.
 
         Args:
-            arrays: One per input, each (n_samples, size of the input).
+            arrays: Inputs, (n_samples, size of the input) each.
 
         Returns:
             One per output, each (n_samples, size of the output); not a number in a sample whose

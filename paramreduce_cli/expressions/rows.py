@@ -203,7 +203,10 @@ def _cancel(row: IntArray) -> int:
 
 @on_rows
 def put(rows: Rows, number: int, kind: int, row: IntArray) -> None:
-    """Replace the terms of a row. If they are too many, the row stays and the counter FAILED is set.
+    """Replace the terms of a row.
+
+    If they are too many, the row stays and the counter FAILED is set. The former row is saved for :func:`undo`, and the
+    row enters the worklists.
 
     Args:
         rows: Rows of sums and products; changed in place.

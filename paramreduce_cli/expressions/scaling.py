@@ -110,7 +110,7 @@ class _Units:
     """The units of all nodes, as factors, as far as equations between them fix these.
 
     Args:
-        program: Whose nodes.
+        program: Program whose nodes get units.
         n: Number of inputs that may have a unit.
     """
 

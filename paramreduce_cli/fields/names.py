@@ -77,7 +77,7 @@ class OneOf:
         """Return the name if it is known.
 
         Raises:
-            ValueError: It is not known.
+            ValueError: The name is unknown.
         """
         if name not in self.list_names():
             raise UnknownNameError(self._kind, name, self.list_names())

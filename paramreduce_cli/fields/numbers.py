@@ -44,7 +44,7 @@ def parse_number(value: Any, constants: Mapping[str, float] | None = None) -> fl
         constants: Values of constants by name.
 
     Raises:
-        ValueError: It is neither.
+        ValueError: The text is neither a number nor an expression.
     """
     known = {**_CONSTANTS, **(constants or {})}
     example = "write one such as 0.5, 1e-3, pi/2 or 90deg"

@@ -37,7 +37,7 @@ class Physical:
         columns: Columns of each, its parameters in the order of ``INERTIAL``, (n_bodies, 10).
         positive: Parameters that must not be negative.
         sizes: Scale of each parameter, (n_parameters,): its size for a body of that mass and extent; for drives the known value.
-        known: (n_parameters,)
+        known: Known values of the parameters, (n_parameters,).
     """
 
     names: tuple[str, ...]

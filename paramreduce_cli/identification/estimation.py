@@ -38,8 +38,8 @@ class Rows:
     """The rows of W for the columns of one model, with the torques, held in memory.
 
     Attributes:
-        X: One array for each uninterrupted part, (n_samples, n_dof, p).
-        tau: (n_samples, n_dof) each.
+        X: Weighted or plain columns, one array (n_samples, n_dof, p) for each uninterrupted part.
+        tau: Torques, one array (n_samples, n_dof) for each uninterrupted part.
         dz: Speeds, like tau.
         ddz: Accelerations, like tau.
         step: Step between samples, s.
@@ -131,7 +131,7 @@ class LinearFit:
 
     Attributes:
         rows: Rows of the model.
-        parameters: (p,)
+        parameters: Fitted parameters, (p,).
         deviation: Divisor of the torques of each joint, (n_dof,); infinite where not measured.
     """
 

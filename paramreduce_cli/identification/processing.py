@@ -78,8 +78,8 @@ def process_logs(
         unmeasured: Coordinates without torques.
 
     Raises:
-        DataError: They cannot be used; the message names file, row and column.
-        ConfigError: What is asked does not fit the robot.
+        ConfigError: A setting does not fit the robot or the log.
+        DataError: A log cannot be used; the message names file, row and column.
     """
 
     def begin(k: int) -> None:
@@ -220,7 +220,7 @@ def _read_files(
 def _cut_out_jumps(
     recorded: Signals, section: LogSection, names: Sequence[str], first_line: int | None
 ) -> tuple[Signals, list[int], list[str]]:
-    """Cut out the rows of a recording in which positions jump.
+    """Cut out the rows of a recording in which positions jump; with ``outliers: keep`` nothing is cut out or split.
 
     Args:
         recorded: The recording with all of its rows.
@@ -261,7 +261,6 @@ def _compensate_delay(recorded: Signals, delay: float, source: str) -> None:
 
     Raises:
         ConfigError: No torque was recorded at the shifted times.
-        ConfigError: None of them was recorded then.
     """
     time = recorded.time
     if abs(delay) >= np.ptp(time):

@@ -279,7 +279,7 @@ def hint_at_negative_friction(
     Args:
         names: Names of the friction parameters, (n,).
         owners: Joints of the friction parameters, (n,).
-        values: (n,)
+        values: Values of the friction parameters, (n,).
         deviations: Standard deviations, (n,).
     """
     wrong: list[int] = np.flatnonzero(values < -_SURE * deviations).tolist()

@@ -30,7 +30,7 @@ def hint_at_unit(expected: FloatArray, ratios: FloatArray) -> list[str]:
 
     Args:
         expected: Torques of the bodies with the values in the config, (n_samples, n_dof).
-        ratios: The same with the identified values.
+        ratios: Torques of the bodies with the identified values, (n_samples, n_dof).
     """
     sizes = np.sqrt(np.mean(ratios**2, axis=0))
     scaled = [torques / np.where(sizes > 0, sizes, np.inf) for torques in (expected, ratios)]
@@ -56,7 +56,7 @@ def hint_at_rating(tau: FloatArray, rating: FloatArray, names: Sequence[str]) ->
     """Return a hint if torques are far from the ratings of the joints.
 
     Args:
-        tau: (n_samples, n_dof)
+        tau: Torques, (n_samples, n_dof).
         rating: Nominal torques, (n_dof,); infinite where none is measured.
         names: Names of the coordinates.
     """
@@ -83,7 +83,7 @@ def hint_at_sign(
     Args:
         usual: Observation matrix, (n_samples, n_dof, n).
         mirrored: Observation matrices with the motion of one joint after the other reversed; may be empty.
-        tau: (n_samples, n_dof)
+        tau: Torques, (n_samples, n_dof).
         deviation: Standard deviations of the torques, (n_dof,).
         names: Names of the coordinates.
     """
@@ -116,8 +116,8 @@ def hint_at_gravity(
 
     Args:
         W: Observation matrix with the gravity of the config, (n_samples, n_dof, n).
-        pulls: What gravity of one unit along each axis of the base adds to it, (3, n_samples, n_dof, n).
-        tau: (n_samples, n_dof)
+        pulls: Change of W by a unit of gravity along each axis of the base, (3, n_samples, n_dof, n).
+        tau: Torques, (n_samples, n_dof).
         deviation: Standard deviations of the torques, (n_dof,); infinite where they are not measured.
         gravity: Gravity of the config, (3,), m/s^2.
     """

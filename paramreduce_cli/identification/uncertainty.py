@@ -106,8 +106,7 @@ def compute_score_covariance(
     Args:
         segments: Columns of uninterrupted motions, (n_samples, n_dof, p) each.
         noise: Noise of each joint.
-        weights: That rows of a joint are multiplied with twice, as in weighted least squares: one over
-            the variance, (n_dof,).
+        weights: Squares of the factors that rows of each joint are multiplied by, (n_dof,).
     """
     total: FloatArray | None = None
     for X in segments:

@@ -28,7 +28,7 @@ def unround_angle(text: str) -> float:
         The exact angle, or the number itself where it stands for none.
 
     Raises:
-        ValueError: It is no number.
+        ValueError: The text is no number.
     """
     value = float(text)
     if abs(value) < _NOTHING or not math.isfinite(value):

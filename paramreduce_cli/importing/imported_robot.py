@@ -86,7 +86,7 @@ def merge_inertias(parts: Sequence[Inertial]) -> Inertial:
 
 @dataclass(frozen=True)
 class Mimic:
-    """A coordinate is ``ratio`` times that of another joint plus ``offset``."""
+    """A mimic joint's rule: its coordinate is ``ratio`` times that of another joint plus ``offset``."""
 
     joint: str
     ratio: float = 1.0

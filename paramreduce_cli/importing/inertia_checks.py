@@ -16,7 +16,9 @@ _MOST = 8
 
 
 def find_inertia_warnings(links: Mapping[str, Inertial | None]) -> Iterator[str]:
-    """Yield sentences on masses and inertias that no body can have, or that look misplaced."""
+    """Yield warnings about physically impossible masses and inertias, and about inertias that seem to be about another
+    point.
+    """
     given = {name: inertial for name, inertial in links.items() if inertial is not None}
     heavy = {name: one for name, one in given.items() if one.mass > 0}
     sentences = {

@@ -58,7 +58,7 @@ def compile_mjcf(path: Path) -> MjcfReader:
     """Compile a file with MuJoCo, and return its reader; MuJoCo's warnings go to no log file.
 
     Raises:
-        ConfigError: It cannot be compiled, or holds what has no rigid-body meaning.
+        ConfigError: MuJoCo cannot compile the file, or the file has elements without rigid-body meaning.
     """
     import mujoco
 
@@ -260,7 +260,7 @@ class MjcfReader:
         return total or None
 
     def _find_actuators(self, joint: int) -> list[int]:
-        """Return the numbers of the actuators that act on a joint."""
+        """Return the indices of the actuators that act on a joint."""
         on_joint = int(self._mujoco.mjtTrn.mjTRN_JOINT)
         model = self._model
         return [
@@ -400,7 +400,7 @@ class MjcfReader:
         return float(self._model.qpos0[self._model.jnt_qposadr[k]])
 
     def _warn_of_losses(self) -> None:
-        """Note features of the file that a config cannot express."""
+        """Add warnings about features of the file that a config cannot express."""
         model = self._model
         left = {
             "tendons": model.ntendon,

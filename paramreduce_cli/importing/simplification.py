@@ -69,7 +69,7 @@ class ImportedBody:
 
 @dataclass(frozen=True)
 class Coupling:
-    """The coordinate of one body's joint follows that of another's."""
+    """A rule that the coordinate of one body's joint follows that of another body's joint."""
 
     leader: ImportedBody
     follower: ImportedBody
@@ -300,7 +300,8 @@ class _Simplification:
         """Return the independent coordinates: those asked for, else those that the file leaves free.
 
         Raises:
-            ConfigError: A coordinate that is asked for does not move, or options change a robot whose file has loops.
+            ConfigError: A coordinate named by ``--independent`` does not move, or options such as ``--lock`` are given
+                for a file with loops, whose independent coordinates they may not change.
         """
         choice = self._choice
         moved = {body.source.name: body for body in bodies if body.source is not None}

@@ -43,7 +43,7 @@ def read_urdf(path: Path) -> ImportedRobot:
     """Read a URDF file.
 
     Raises:
-        ConfigError: It cannot be read, or is no URDF; names file, line and element.
+        ConfigError: The file cannot be read, or is no URDF; the message names file, line and element.
     """
     return _Reader(path).read_robot()
 

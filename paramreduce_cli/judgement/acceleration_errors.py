@@ -53,8 +53,8 @@ def compute_acceleration_errors(
     Args:
         blocks: The samples.
         direct: Mass matrices and biases of models.
-        parameters: One model a column, zero where a parameter is not kept, (n_parameters, n_models).
-        nominal_acceleration: (n_dof,)
+        parameters: Parameters, one column per model, zero for dropped ones, (n_parameters, n_models).
+        nominal_acceleration: Divisor of the errors of each coordinate, (n_dof,).
 
     Returns:
         Errors; infinite where a mass matrix is singular at some sample.

@@ -67,7 +67,7 @@ def compute_torque_errors(
 
     Args:
         blocks: The samples.
-        parameters: One model a column, zero where a parameter is not kept, (n_parameters, n_models).
+        parameters: Parameters, one column per model, zero for dropped ones, (n_parameters, n_models).
         weights: Nominal torque of each joint, (n_dof,); infinite where it is not measured.
     """
     n_models, n_dof = parameters.shape[1], weights.size

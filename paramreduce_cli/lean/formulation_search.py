@@ -40,7 +40,7 @@ def search_choices(
     Args:
         tree: Tree to formulate.
         build: Function that builds the model.
-        start: One choice per joint.
+        start: Formulations to start from, one per joint.
         dropped: Positions of parameters that are zero.
     """
     result = list(start)
@@ -89,7 +89,7 @@ def _improve_choices(
 
     Args:
         tree: Tree to formulate.
-        start: One choice per joint.
+        start: Formulations to start from, one per joint.
         build: Function that builds the model.
         pieces: Part of the tree that is counted, per joint.
         options: Function that lists the alternatives at a joint.

@@ -36,7 +36,7 @@ class Diagonal(StrEnum):
 
 @dataclass(frozen=True)
 class FrameMotion:
-    """The rates of a frame, in its own components.
+    """The rotational motion of a frame, in its own components: angular velocity, angular acceleration and U.
 
     Attributes:
         omega: Angular velocity.
@@ -127,7 +127,7 @@ def add_rotation(
 
 @cache_expressions
 def change_components(turn: ConstantRotation, frame: FrameMotion) -> FrameMotion:
-    """Return the same motion in the components of a frame that is fixed in the first."""
+    """Return the same rotational motion in the components of a frame that is fixed in the first."""
     if not turn.is_permutation:
         return make_frame_motion(turn.to_child(frame.omega), turn.to_child(frame.rate))
     axes = turn.find_permutation()

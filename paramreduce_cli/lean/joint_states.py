@@ -33,7 +33,7 @@ class Symbols:
 
     Args:
         graph: Graph of the symbols.
-        tree: Whose models.
+        tree: Tree of the models.
         dropped: Positions of parameters that are zero.
     """
 
@@ -130,7 +130,7 @@ class Kinematics:
 
     Args:
         tree: The tree.
-        choices: One formulation per joint.
+        choices: Formulations, one per joint.
         graph: Graph that the expressions are added to.
         moving: Whether joints accelerate.
         dropped: Positions of parameters that are zero.

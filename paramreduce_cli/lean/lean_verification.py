@@ -73,7 +73,7 @@ def reject_if_wrong(
         tolerance: Largest ratio that is allowed.
 
     Raises:
-        FormulationError: They are too far off.
+        FormulationError: The ratio exceeds the tolerance.
     """
     error = np.max(np.abs(off), initial=0.0) / np.max(np.abs(against), initial=1e-300)
     if not error <= tolerance:

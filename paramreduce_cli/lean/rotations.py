@@ -68,7 +68,7 @@ class ConstantRotation:
 
     Args:
         graph: Graph of the expressions.
-        rotation: (3, 3)
+        rotation: Rotation matrix, (3, 3).
     """
 
     def __init__(self, graph: Graph, rotation: FloatArray) -> None:

@@ -89,7 +89,7 @@ class PathPlanner:
         """Return one segment, or several through poses in between.
 
         Raises:
-            DataError: None was found; the message says what is in the way of the straight one.
+            DataError: No path was found; the message says what is in the way of the straight one.
         """
         try:
             return [self._plan_straight(start, end)]
@@ -143,6 +143,7 @@ class PathPlanner:
         """Return the straight segment with the shortest of several durations that keeps the limits.
 
         Raises:
+            _NoPathError: Every duration exceeds a limit, or something is in the way.
             _NoWayError: None does, or something is in the way.
         """
         limits = self._limits

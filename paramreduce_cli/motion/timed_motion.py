@@ -48,7 +48,7 @@ def sample_motion(
     Args:
         mechanism: Mechanism of the robot.
         trajectories: Trajectories with their period.
-        trajectory: One of the trajectories; its joints may be whole turns away if that is nearer to the pose.
+        trajectory: Trajectory to run; its joints may be whole revolutions away if that is nearer to the pose.
         rate: Samples per second.
         title: Title for people.
         start_pose: Position where the machine stands, (n_dof,); None to begin with the trajectory itself.

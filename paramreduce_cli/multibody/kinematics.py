@@ -46,8 +46,8 @@ class JointMotion:
         return (ca.SX(x), ca.SX(y), ca.SX(z))
 
     def get_arm(self) -> Vector:
-        """Return the vector from a point of the joint's axis that is fixed in the parent to the body's origin, in the
-        body's frame, m.
+        """Return the constant vector from the origin of the joint's frame, which moves with the body, to the body's
+        origin, in the body's frame, m.
         """
         offset = self.body.joint_to_body[:3, :3].T @ self.body.joint_to_body[:3, 3]
         return (ca.SX(offset[0]), ca.SX(offset[1]), ca.SX(offset[2]))

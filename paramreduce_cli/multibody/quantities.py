@@ -31,7 +31,7 @@ class Quantities:
     """A set of bounded quantities of a mechanism, evaluated on many configurations.
 
     Args:
-        mechanism: Whose quantities they are.
+        mechanism: Mechanism with the bounded quantities.
         constraints: Constraints, each with one or two bounds.
     """
 

@@ -51,7 +51,9 @@ def draw_states(
 
 
 def _estimate_length(mechanism: Mechanism) -> float:
-    """Return a typical length of the mechanism, m; 1 if all its bodies are in one place."""
+    """Return a typical length, m: the largest named length, else the extent of the body frames in one position; 1 if
+    all are in one place.
+    """
     if mechanism.lengths:
         return max(abs(length.value) for length in mechanism.lengths)
     q = np.zeros(mechanism.n_q) if mechanism.loops is None else mechanism.loops.assembly

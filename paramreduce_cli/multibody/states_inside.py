@@ -86,7 +86,9 @@ class StatesInside:
         return rng.uniform(lower, upper, size=shape)
 
     def _are_inside(self, q: FloatArray) -> BoolArray:
-        """Return whether positions keep limits and constraints, (n_samples,)."""
+        """Return whether positions keep limits and constraints and, with loops, are no nearer to a singular
+        configuration than the known positions, (n_samples,).
+        """
         inside = ((q >= self._lower[0]) & (q <= self._upper[0])).all(axis=1)
         if self._mechanism.loops is not None:
             inside &= self._coordinates.compute_distance(q) >= self._nearest
@@ -107,8 +109,10 @@ class StatesInside:
         return q[self._are_inside(q)]
 
     def _shorten(self, q: FloatArray, drawn: FloatArray) -> States:
-        """Return states of loops at positions q, whose velocities and accelerations are those drawn, reduced where a
-        dependent coordinate would exceed a limit.
+        """Return q, dq and ddq of loops at positions q, each (n_samples, n_q).
+
+        Drawn velocities and accelerations are reduced where coordinates would exceed a limit, or where velocities alone
+        would cause too large accelerations.
 
         Args:
             q: Positions, (n_samples, n_q).

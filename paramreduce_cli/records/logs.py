@@ -194,7 +194,7 @@ class Residuals:
 
 @record
 class Consistency:
-    """The standard parameters nearest to the data that a machine can have."""
+    """The physically consistent standard parameters nearest to the data."""
 
     standard: FloatArray
     """(n_standard,)"""

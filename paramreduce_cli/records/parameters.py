@@ -63,7 +63,7 @@ class Kind(Enum):
         """Return the kind with a symbol.
 
         Raises:
-            KeyError: There is none.
+            KeyError: There is no kind with this symbol.
         """
         return _BY_SYMBOL[symbol]
 

@@ -233,7 +233,7 @@ class Proofs(BySize):
         """Return the proof of one size alone.
 
         Raises:
-            KeyError: There is none of that size.
+            KeyError: There is no proof of this size.
         """
         row = self.find_row(n)
         if row is None:

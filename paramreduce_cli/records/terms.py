@@ -40,7 +40,7 @@ class TermFront:
 
 @record
 class TermModel:
-    """A function of the dynamics with pruned terms, some nodes standing for others; what that does."""
+    """A function of the dynamics with pruned terms and replaced nodes, and its accuracy."""
 
     heuristic: str
     """Whose subset it started from."""

@@ -65,7 +65,7 @@ class JointLimits:
 
 @record
 class Trajectory:
-    """One optimised finite Fourier series with what was asked of it and how it went."""
+    """One optimised finite Fourier series, with its figures and the course of the optimisation."""
 
     coefficients: FloatArray
     """[q0, a1, b1, a2, b2, ...] per joint, (n_dof, 1 + 2 harmonics)."""

@@ -55,7 +55,7 @@ class Selected:
 
 @record
 class Leanest:
-    """The function with the fewest operations within what is asked for."""
+    """The function with the fewest operations within the tolerances."""
 
     model: str
     """``HEURISTIC:N``, or ``terms``."""

@@ -28,7 +28,7 @@ def list_choices(reduction: Reduction) -> list[str]:
 
 
 def make_full_model(model: Model) -> ReducedModel:
-    """Return the model that keeps every standard parameter with an effect on the torques."""
+    """Return the model of all standard parameters that have an effect on the torques, before regrouping."""
     kept = np.flatnonzero(model.affecting)
     return _make_model(model, kept, model.values[kept])
 

@@ -21,8 +21,8 @@ class SelectionProblem:
     """A least-squares problem W phi = chi, weighted and compressed to a triangular factor.
 
     Attributes:
-        W: (k, n)
-        chi: (k,)
+        W: Triangular factor of the observation matrix, (k, n).
+        chi: Torques, transformed like W, (k,).
         candidates: Columns that may be chosen, in ascending order.
         preference: All columns, the most wanted first; it breaks every tie.
         joined: Sets of several columns that are kept or dropped together; every other column is a group alone.

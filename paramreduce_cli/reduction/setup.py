@@ -94,7 +94,7 @@ def make_problem(
         values: Values of the standard parameters where these are known, (n_standard,).
 
     Raises:
-        DataError: There is nothing to choose from, or there is nothing to fit.
+        DataError: No column has an effect, or all torques are zero.
     """
     W, chi = factor[:, :-1], factor[:, -1]
     _check_sizes("observation matrix", W)

@@ -49,7 +49,9 @@ class Curve:
 
 
 def gather_curves(data: ReportData) -> list[Curve]:
-    """Return the curves of all heuristics, in their order; colours and markers are the same in all figures."""
+    """Return a curve of error against size for each heuristic, in their order; heuristics with the same models share
+    one curve.
+    """
     found: list[Curve] = []
     seen: dict[int, list[_Values]] = {}
     models: list[list[_Values]] = []

@@ -112,7 +112,7 @@ class ReportData(Artifacts):
         """Model of the robot, for figures and tables that need a mechanism.
 
         Raises:
-            LookupError: There is none.
+            LookupError: The report is of user-supplied columns, without a robot.
         """
         if self.model is None:
             raise LookupError("a figure or a table of a mechanism, and there is none")

@@ -112,7 +112,6 @@ def get_place(function: Callable[..., Any]) -> PagePlace:
 
     Raises:
         TypeError: The function is not decorated with ``placed``.
-        TypeError: It does not say so.
     """
     place = getattr(function, "place", None)
     if not isinstance(place, PagePlace):

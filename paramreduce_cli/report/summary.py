@@ -34,8 +34,8 @@ from paramreduce_cli.records import (
 def gather_summary(
     artifacts: Artifacts, leanest: Mapping[str, Leanest], provenance: Provenance
 ) -> dict[str, Any]:
-    """Gather the numbers of all artifacts as plain data; infinite ones become None, and so do those
-    that only a mechanism tells where there is none.
+    """Gather the numbers of all artifacts as plain data; infinite numbers become None, and so do those of a mechanism
+    if there is none.
     """
     model, reduction, validation = artifacts.model, artifacts.reduction, artifacts.validation
     selected = validation.selected

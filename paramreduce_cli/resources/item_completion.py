@@ -21,17 +21,18 @@ def complete_items(
     describe: Callable[[Any], str] = lambda _: "",
     prepare: Callable[[], None] = lambda: None,
 ) -> dict[str, Record]:
-    """Compute the items that are not kept yet, and keep each as soon as it is computed.
+    """Compute the items that are missing, and store each as soon as it is computed.
 
     Args:
         run: Run that owns the progress callback.
         items: Kept items, and the part of them that this job computes.
         keys: Keys of all items, in their order.
-        state: Returns the state that the work on every item needs; picklable if there are several processes.
+        state: Function that returns the state that the work on every item needs; picklable if there are several
+            processes.
         work: Computes the item of a key from the state; picklable if there are several processes.
         task: Name of the work for the progress.
         jobs: Number of processes.
-        describe: Returns a detail of a finished item for the progress.
+        describe: Function that returns a detail of a finished item for the progress.
         prepare: Called in this process before worker processes start, if an item is missing.
 
     Returns:

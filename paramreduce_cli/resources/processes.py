@@ -24,7 +24,7 @@ class WorkerPool(Generic[State]):
     """A pool of workers that hold the same state: other processes, or this process alone.
 
     Args:
-        state: Returns the state; called only if this process itself works.
+        state: Function that returns the state; called only if this process itself works.
         processes: Worker processes that hold the state; None to work in this process.
     """
 
@@ -69,7 +69,7 @@ def start_workers(jobs: int, state: Callable[[], State]) -> Iterator[WorkerPool[
 
     Args:
         jobs: Number of processes; with fewer than 2 this process does all work.
-        state: Returns the state that the work on every item needs; picklable. Each process calls it once.
+        state: Function that returns the state that the work on every item needs; picklable. Each process calls it once.
     """
     if jobs < 2:
         yield WorkerPool(state, None)

@@ -52,7 +52,7 @@ def _compute_cosine_and_sine(angle: float) -> tuple[float, float]:
 
 
 def _remove_rounding(value: float) -> float:
-    """Return the exact number that a value rounds, such as 0, 1/2 or 1, or the value itself."""
+    """Return 0, ±1/2 or ±1 if the value is one of them to rounding (1e-10), else the value."""
     for exact in _EXACT:
         if abs(abs(value) - exact) <= _WRITTEN:
             return float(np.copysign(exact, value)) if exact else 0.0

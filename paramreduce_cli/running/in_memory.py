@@ -23,8 +23,8 @@ def run_in_memory(
         run: Worker processes and callbacks.
 
     Raises:
+        ParamreduceError: A stage fails.
         TypeError: A record that it needs is not among them.
-        ParamreduceError: It fails.
     """
     inputs = Inputs(config if isinstance(config, Config) else None)
     lent: dict[Any, Any] = {Run: run, ProgressCallback: run.progress, Items: Items(), **records}

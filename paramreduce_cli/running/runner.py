@@ -91,7 +91,7 @@ class Outcome:
 
 
 def format_arguments(config: Path | None, results: Path | None, overrides: Sequence[str]) -> str:
-    """Return the config and the options of a call, for commands that follow it."""
+    """Return the config and the options of a command line, for commands that follow it."""
     words = [str(config)] if config is not None else []
     words += ["--results", str(results)] if results is not None else []
     words += [word for text in overrides for word in ("--set", text)]
@@ -118,7 +118,7 @@ class Runner:
     """A runner of stages on one robot in one folder.
 
     Attributes:
-        config: None where a stage is run on brought files alone.
+        config: Config; None if a stage is run on user-supplied files alone.
         store: The results folder.
         jobs: Worker processes.
         callbacks: Functions that a run calls.
@@ -149,7 +149,7 @@ class Runner:
             part: Items to be done; the artifact is made only where they are all items.
 
         Raises:
-            ParamreduceError: Its inputs are missing or wrong, or it fails.
+            ParamreduceError: The inputs of the stage are missing or wrong, or the stage fails.
         """
         path = self.store.get_path(stage.output)
         self._cut_short = False
@@ -254,7 +254,7 @@ class Runner:
         ]
 
     def _find_unchanged(self, stage: Stage, inputs: Inputs) -> frozenset[str]:
-        """Return the sections and files that have not changed since the stage ran before."""
+        """Return the sections and files that have not changed since the stage last ran."""
         stamp = self.store.read_stamp(stage.output)
         if stamp is None or self.config is None:
             return frozenset()
@@ -304,7 +304,7 @@ class Runner:
 
     @property
     def config_name(self) -> str:
-        """Name of the config's file; empty where the run was not started with one at the shell."""
+        """Name of the config's file; empty if the run was not started from the shell."""
         words = shlex.split(self.arguments) if self.config is not None else []
         return Path(words[0]).name if words else ""
 
@@ -324,7 +324,7 @@ class Runner:
                 self.callbacks.warn(f"{text}; {remedy}")
 
     def _list_upstream(self, stage: Stage) -> list[type]:
-        """Return the records that a stage's artifact comes from, each after those that it is made from."""
+        """Return the records that a stage's artifact depends on, each after those it depends on itself."""
         records: dict[type, None] = {}
         for entry in stage.artifacts:
             supplied = entry.type is Samples and self.samples is not None

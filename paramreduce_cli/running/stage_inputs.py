@@ -54,7 +54,7 @@ def call_stage(stage: Stage, arguments: dict[str, Any]) -> Any:
     """Call a stage; numerical errors are raised as errors of the config's keys.
 
     Raises:
-        ParamreduceError: It fails.
+        ParamreduceError: The stage fails.
     """
     try:
         return stage.call(arguments)

@@ -201,7 +201,7 @@ def load_sweep(path: Path) -> Sweep:
         path: The YAML; relative paths in it are relative to its folder.
 
     Raises:
-        ConfigError: It is no such list, two runs would have one name, or a config cannot be used.
+        ConfigError: The file is no list of runs, two runs have one name, or a config cannot be used.
     """
     section = load_section(path, SweepSection)
     folder = _resolve_beside(path, section.results)
@@ -220,10 +220,10 @@ def load_sweep(path: Path) -> Sweep:
 
 
 def _check_config(path: Path, run: SweepRun) -> None:
-    """Raise ConfigError for a config that cannot be used, with its place in the list.
+    """Raise ConfigError, with the place in the list, if the config of a run cannot be used.
 
     Raises:
-        ConfigError: So it is.
+        ConfigError: The config cannot be used; the message names the list and the key of the run in the list.
     """
     try:
         run.stages  # noqa: B018
@@ -248,7 +248,7 @@ def _iterate_runs(path: Path, section: SweepSection, folder: Path) -> Iterator[S
 
 
 def _resolve_beside(path: Path, other: Path) -> Path:
-    """Return a path in the list as seen from the working folder."""
+    """Return a path of the list relative to the working folder."""
     joined = other if other.is_absolute() else path.parent / other
     here = Path.cwd()
     resolved = joined.resolve()

@@ -87,7 +87,7 @@ def build_model(robot: Robot, model: ModelSection, run: Run) -> Model:
 def _say_other_modes(
     robot: Robot, model: ModelSection, mechanism: Mechanism, base: BaseParameters
 ) -> None:
-    """Warn if the loops have another assembly mode with another number of base parameters.
+    """Warn if the loops have another assembly mode with a different number of base parameters.
 
     A guess that leads to the wrong one of them is seen by this alone.
     """
@@ -135,7 +135,8 @@ def _format_expressions(
     states: States,
     rng: np.random.Generator,
 ) -> list[str]:
-    """Return the regrouping relations, with coefficients named if they hold for other lengths too.
+    """Return the base parameters as sums of standard ones, with coefficients as products of lengths where these
+    reproduce them for other lengths too.
 
     Without named lengths, as in mechanisms with loops, coefficients are numbers.
     """

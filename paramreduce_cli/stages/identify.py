@@ -87,7 +87,7 @@ def identify(
 
 
 def _make_expansion(chosen: ReducedModel) -> FloatArray:
-    """Return the matrix that maps a model's parameters to standard parameters, (n_standard, n)."""
+    """Return the matrix that expresses a model's columns by those of the standard parameters, (n_standard, n)."""
     columns = np.zeros((chosen.position.size, chosen.n))
     columns[chosen.kept, chosen.position[chosen.kept]] = 1.0
     return columns
@@ -150,7 +150,7 @@ def _compute_errors(
 
 
 def _cross_validate(factors: FloatArray, deviation: FloatArray) -> FloatArray:
-    """Return the error on each trajectory when fitted without it; nothing if there is only one."""
+    """Return the error on each fold of a fit without that fold; nothing if there is only one."""
     measured = np.isfinite(deviation)
     found = []
     for k in range(len(factors) if len(factors) > 1 else 0):
@@ -207,7 +207,7 @@ def _fit_consistent(
 
 
 def _take_first_samples(part: SampleSet) -> list[Block]:
-    """Return the first samples, for figures."""
+    """Return the first samples of a set, for figures."""
     found: list[Block] = []
     for block in part.iterate_blocks():
         if block.trajectory != 0 or sum(b.time.size for b in found) >= _MOST_SHOWN:

@@ -131,7 +131,7 @@ def _find_point_to_point(
     period: float,
     sets: dict[str, tuple[Trajectory, ...]],
 ) -> tuple[PointToPoint, ...]:
-    """Find motions between positions that trajectories of the test set pass, or of another one where it has none."""
+    """Find motions between positions of the test trajectories, or of other trajectories if there are none."""
     passed = sets["test"] or sets["validation"] or sets["estimation"]
     times = sample_times(period, section.points)
     positions = [
@@ -201,7 +201,8 @@ def _evaluate_coefficients(
 def _check_motion(
     source: str, name: str, trajectories: tuple[Trajectory, ...], limits: JointLimits
 ) -> None:
-    """Refuse trajectories in which nothing moves; warn of joints that rest or go too far.
+    """Raise DataError if nothing moves in a trajectory; warn if a joint rests in any of them, or exceeds its position
+    or velocity limit.
 
     Raises:
         DataError: Nothing moves in one of the trajectories.

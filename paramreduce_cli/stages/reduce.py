@@ -126,7 +126,7 @@ def _check_proves(heuristics: Sequence[str]) -> None:
 
 
 def _prove_part(task: SelectionTask, kept: KeptProofs, sizes: Sequence[int]) -> NoReturn:
-    """Search for this job's part of the proofs, and keep what is proven.
+    """Search for this job's part of the proofs, and store what is proven.
 
     Args:
         task: Criterion, effort and callbacks.
@@ -149,7 +149,11 @@ def _prove_part(task: SelectionTask, kept: KeptProofs, sizes: Sequence[int]) -> 
 
 
 def _choose_weights(section: ReductionSection, samples: Samples) -> FloatArray:
-    """Return the size that each joint's errors are divided by, (n_dof,), or raise DataError if it is unusable."""
+    """Return the divisor of each joint's errors, (n_dof,).
+
+    Raises:
+        DataError: A divisor is zero or no number.
+    """
     weights = samples.nominal_torque
     if section.weighting == "none":
         n_dof = next(iter(samples.estimation.iterate_blocks())).tau.shape[1]
@@ -231,7 +235,7 @@ def _make_criterion_inputs(
 
 
 def _warn_of_open_proofs(proofs: Proofs | None) -> None:
-    """Warn of sizes that are not proven."""
+    """Warn about sizes whose best subset is not proven."""
     if proofs is None or proofs.n_proven == proofs.n_provable:
         return
     counts = {status: proofs.status.count(status) for status in ProofStatus}

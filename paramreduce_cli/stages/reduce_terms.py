@@ -91,7 +91,7 @@ def reduce_terms(
 
 @dataclass(frozen=True)
 class _Task:
-    """A task that every function gets: budget, samples and starts."""
+    """The budget, samples and starts that the searches of all functions share."""
 
     section: TermsSection
     budget: Budget
@@ -155,7 +155,7 @@ def _search(task: _Task, name: str) -> TermModel | None:
 
 @dataclass(frozen=True)
 class EvaluatedProgram:
-    """A program and its errors on both sets."""
+    """A program with its errors on both sets."""
 
     program: Simplified
     errors: tuple[Errors, Errors]
@@ -222,7 +222,7 @@ def _warn_of_time_limit(name: str) -> None:
 
 
 def _warn_of_accelerations(term: TermModel) -> None:
-    """Warn that M is positive definite, but accelerations are not accurate."""
+    """Warn that accelerations are inaccurate although M is positive definite."""
     errors = (term.acceleration_error.estimation, term.acceleration_error.validation)
     if np.nanmax([0.0, *errors]) > 1:
         warnings.warn(
@@ -234,10 +234,10 @@ def _warn_of_accelerations(term: TermModel) -> None:
 
 
 def _warn_of_missing(names: list[str], others: bool, part: str) -> None:
-    """Warn of functions without a program within the budget.
+    """Warn about functions for which no program within the budget was found.
 
     Raises:
-        ConfigError: There is no other one.
+        ConfigError: No other function is left.
     """
     if not names:
         return

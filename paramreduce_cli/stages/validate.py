@@ -192,7 +192,7 @@ def _reject_test_limits(judging: ValidationSection) -> None:
     """Raise ConfigError for limits on a test set if there is none.
 
     Raises:
-        ConfigError: There is such a limit.
+        ConfigError: The config limits errors on the test set.
     """
     for name in judging.accept.model_dump(exclude_none=True):
         if "_test" in name:
@@ -307,8 +307,8 @@ class _Models:
     known.
 
     Attributes:
-        values: (n_standard, n_models)
-        rows: Which models the subsets of each heuristic are.
+        values: Parameters of each model, (n_standard, n_models).
+        rows: Indices, for each heuristic, of the models that its subsets are.
     """
 
     def __init__(self, reduction: Reduction, full: FloatArray | None) -> None:
@@ -392,7 +392,7 @@ def _list_cross_validated(section: SelectedSection, reduction: Reduction) -> dic
     """Return the heuristics for cross-validation by the name of the method that ran.
 
     Raises:
-        ConfigError: None selects by torque.
+        ConfigError: No heuristic selects by torque.
     """
     methods = {name: SelectionMethod.parse(name) for name in reduction.heuristics}
     found = {

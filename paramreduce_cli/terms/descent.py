@@ -164,7 +164,7 @@ class Descent:
         Args:
             history: History of the descent.
             rng: Random generator for the choice of the program, and for rewriting.
-            searching: Makes searches.
+            searching: Function that makes the term search of a program.
         """
         near = [count for count in sorted(history.visited) if count <= history.fewest / _LEG]
         count = int(rng.choice(near))
@@ -213,7 +213,7 @@ class Descent:
 
     def _rewrite(self) -> Descent:
         """Return a descent from the leanest program so far, rewritten with fewer operations, or this descent if the
-        rewritten program exceeds the budget.
+        rewritten program exceeds the budget of errors.
         """
         passed = self.visited[min(self.visited)]
         simplified = self.history.rebuild(passed)
@@ -243,7 +243,7 @@ def continue_on_samples(
 
     Args:
         history: History of a descent on some samples.
-        searching: Makes searches on others.
+        searching: Function that makes the term search of a program on the other samples.
 
     Returns:
         None where no program is within the budget there.

@@ -71,7 +71,7 @@ class Evaluator:
     Args:
         model: Model of the robot.
         samples: Both sets.
-        nominal_torque: (n_dof,)
+        nominal_torque: Divisor of the torques of each joint, (n_dof,).
         limits: Limits of the independent coordinates; what has none is limited by what the estimation set reaches.
         constraints: Constraints that positions keep in addition.
         direct: Whether the function is [M | delta].
@@ -219,8 +219,8 @@ class Evaluator:
         ]
 
     def find_smallest_eigenvalue(self, program: Simplified) -> tuple[float, int]:
-        """Return the smallest eigenvalue of all mass matrices evaluated, and the number of random states inside the
-        limits among them.
+        """Return the smallest eigenvalue of the mass matrices on both sets and on random states inside the limits, and
+        the number of these random states.
         """
         smallest, states = np.inf, 0
         for one in chain(*self._sets, self._random_poses):

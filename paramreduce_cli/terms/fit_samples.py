@@ -205,8 +205,8 @@ def make_samples(
     Args:
         mechanism: Mechanism of the robot.
         blocks: States and torques.
-        nominal_torque: (n_dof,)
-        nominal_acceleration: (n_dof,)
+        nominal_torque: Divisor of the torques of each joint, (n_dof,).
+        nominal_acceleration: Divisor of the accelerations of each coordinate, (n_dof,).
         direct: Whether the program gives the lower triangle of M, row by row, and delta, not torques.
         projected: Whether it does so for the independent coordinates of loops, with R and b handed in.
         coordinates: Coordinates of the mechanism, if they are at hand.

@@ -231,7 +231,7 @@ def compute_effects(
         adjoints: Derivatives of the quantities by the nodes, (n_nodes, n_quantities, n_samples).
         candidates: Node and what goes of it, the whole or an operand, (n_candidates, 2).
         program: The program.
-        pruning: What has been removed from it already.
+        pruning: Pruning of the program, with the terms that are removed already.
     """
     operands = program.operands
     kept, source, factor = pruning

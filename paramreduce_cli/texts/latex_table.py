@@ -130,7 +130,9 @@ def _format_row(cells: Iterable[str]) -> str:
 
 
 def _choose_column_type(cells: Sequence[str]) -> str:
-    """Return the column type of cells: aligned decimal points for numbers, line breaks for long texts."""
+    """Return the type of a column: aligned decimal points for numbers, right-aligned for percentages, with line breaks
+    for long texts, else left-aligned.
+    """
     found = [_NUMBER.fullmatch(cell) for cell in cells]
     if cells and all(match is not None and match[0].strip("-") for match in found):
         parts = [match.groups(default="") for match in found if match is not None]

@@ -2,12 +2,12 @@
 
 import pytest
 
-from paramreduce_cli.cli.suggestions import Call, find_nearest_choice, suggest_after_error
+from paramreduce_cli.cli.suggestions import CommandLine, find_nearest_choice, suggest_after_error
 from paramreduce_cli.errors import ArtifactError, ConfigError, DataError, MissingConfigError
 
 
 def suggested(error, typed):
-    lines = suggest_after_error(error, Call(typed.split(), None))
+    lines = suggest_after_error(error, CommandLine(typed.split(), None))
     return lines if lines.startswith(("Next", "Then")) else ""
 
 

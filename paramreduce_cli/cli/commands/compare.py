@@ -78,7 +78,7 @@ def _describe_selected(summary: dict[str, Any]) -> str:
 
 
 def _say_quantity(quantity: str, bad: Sequence[Difference]) -> None:
-    """Print the worst difference of a quantity, or all of them if the call asks for details."""
+    """Print the worst difference of a quantity, or with --verbose all differences."""
     if not bad:
         return
     worst = max(bad, key=lambda difference: difference.size)

@@ -172,7 +172,7 @@ def _find_leanest(config: Config, store: Store, function: str) -> str:
     """Return the name of the model whose function has the fewest operations within the config's limits.
 
     Raises:
-        ConfigError: There is none within it.
+        ConfigError: No function is within the limits.
     """
     validation = load_current(config, store, Validation)
     terms = load_current(config, store, TermReduction) if config.terms is not None else None
@@ -186,6 +186,9 @@ def _find_leanest(config: Config, store: Store, function: str) -> str:
 
 def _find_standard(loading: dict[type, Any], text: str | None, chosen: ReducedModel) -> FloatArray:
     """Return standard parameters for a robot's file.
+
+    For base parameters they are the closest to the robot's own among all that give the same torques; those of
+    consistent models are taken as they are.
 
     A model is torques for base parameters, which many standard ones share: those closest to the
     robot's own, but for consistent ones, which are what they are.

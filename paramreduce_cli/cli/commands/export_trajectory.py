@@ -99,7 +99,7 @@ def _find_first(
     """Return the first trajectory of the estimation set with a move to its start and back.
 
     Raises:
-        DataError: There is none; of the first one it is said why.
+        DataError: No trajectory allows a move to its start and back; the message says why the first does not.
     """
     refused: list[DataError] = []
     for k in range(1, len(trajectories.estimation) + 1):
@@ -114,7 +114,7 @@ def _find_chosen(trajectories: Trajectories, which: str) -> Trajectory:
     """Return the trajectory that SET:NUMBER names.
 
     Raises:
-        ConfigError: There is no such trajectory; the message lists those that there are.
+        ConfigError: There is no such trajectory; the message lists the existing ones.
     """
     name, _, number = which.partition(":")
     sets = {name: getattr(trajectories, name) for name in SETS}

@@ -78,7 +78,7 @@ def _find_results() -> Path:
     """Return the results folder if there is only one.
 
     Raises:
-        ConfigError: There is none, or more than one.
+        ConfigError: There is no results folder, or more than one.
     """
     found = sorted(path.parent for path in Path("results").glob("*/validation.h5"))
     if len(found) == 1:
@@ -155,7 +155,7 @@ def _fold_datasets(datasets: Sequence[tuple[str, str, str]]) -> Iterator[tuple[s
 
 
 def _make_family(row: tuple[str, str, str]) -> tuple[str, bool]:
-    """Return the folder of a numbered dataset and True, or the dataset's own path and False."""
+    """Return the folder of a numbered dataset and True, or the path of another dataset and False."""
     place, _, last = row[0].rpartition("/")
     return (place, True) if last.isdecimal() else (row[0], False)
 

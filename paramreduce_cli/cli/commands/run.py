@@ -203,7 +203,9 @@ def _say_summary(summary: dict[str, Any]) -> None:
 
 
 def _list_cells(row: dict[str, Any], *, tested: bool) -> list[str]:
-    """Return errors and operations of a model: on the test set, if there is one, else on both other sets."""
+    """Return errors and operations of a model as cells of the table: on the test set if there is one, else on both
+    other sets.
+    """
     cells = []
     for what in ("torque_error", "acceleration_error"):
         error = row[what]
@@ -216,7 +218,7 @@ def _list_cells(row: dict[str, Any], *, tested: bool) -> list[str]:
 
 
 def _format_errors(error: dict[str, Any]) -> str:
-    """Return the errors of a function on the test set, or on the sets that there are; empty where none are known."""
+    """Return the errors of a function on the test set, or on the other sets; empty if none are known."""
     if error["test"] is not None:
         return format_percent_range(**error["test"])
     return " / ".join(format_percent(one) for one in error.values() if one is not None)

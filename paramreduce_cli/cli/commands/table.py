@@ -88,7 +88,7 @@ def _list_finished(listed: Path, sweep: Sweep) -> dict[Path, dict[str, Any]]:
     """Return the folders of the finished runs, with their variants and seeds; report the others.
 
     Raises:
-        ArtifactError: None has.
+        ArtifactError: No run has finished.
     """
     ended = {
         run.folder: {"variant": run.variant, "seed": run.seed}

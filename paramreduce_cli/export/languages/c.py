@@ -291,7 +291,7 @@ class _Writer:
 
 @dataclass(frozen=True)
 class _Dependence:
-    """The dependence of a function's nodes on parameters and states."""
+    """A record of which nodes of a function depend on parameters alone, and which on states."""
 
     states: list[bool]
     """Whether each node depends on the state, and not on parameters alone."""

@@ -215,8 +215,7 @@ class Coordinates:
             q: Generalised coordinates, (n_samples, n_q).
 
         Raises:
-            DataError: It comes to a singular configuration, passes through one, or jumps to
-                another assembly mode.
+            DataError: The motion comes to or passes a singular configuration, or jumps to another assembly mode.
         """
         if self.mechanism.loops is None:
             return

@@ -301,7 +301,9 @@ def _span(s: State, data: Data, count: int) -> None:
 def _include(
     tableau: FloatArray, counters: IntArray, errors: FloatArray, s: State, data: Data, j: int
 ) -> None:
-    """Include a free column, and lower the error by what the column explains."""
+    """Move the column at position j out of the free ones; the last free column takes its position, and the error falls
+    by what the column explains. The caller has listed the column as included.
+    """
     own, row = tableau[j, j], tableau.shape[0] - 2
     if own > SURE:
         errors[INSIDE] -= tableau[row, j] ** 2 / own

@@ -20,7 +20,7 @@ def join_subtrees(parts: Sequence[Proofs]) -> Proofs:
         parts: Proofs of all jobs on the same data.
 
     Raises:
-        DataError: They were not dealt the same subtrees.
+        DataError: The jobs divided the search in different ways.
     """
     first = parts[0]
     for row, n in enumerate(first.n.tolist()):

@@ -25,7 +25,7 @@ class PartedSearch:
     """A search for one size, split as often as threads ask for work.
 
     Args:
-        search: Makes a search that goes on from a log.
+        search: Function that makes a search that continues from a log.
         log: State of all parts that an earlier search left open; empty at the beginning.
     """
 

@@ -33,9 +33,9 @@ class GroupedProblem:
     """A selection problem with columns and chi of unit length, its columns numbered from zero.
 
     Attributes:
-        X: (k, n_columns)
-        chi: (k,)
-        columns: Their numbers in the problem it was made from, groups together.
+        X: Columns of unit length, (k, n_columns).
+        chi: Right side of unit length, (k,).
+        columns: Indices of the columns in the problem that this one was made from; columns of a group are adjacent.
         group: Number of the group that each column belongs to, (n_columns,).
         condition: Largest over smallest non-zero singular value of X.
         nearest: Smallest sine of the angle between two columns, those parallel to rounding aside.

@@ -112,7 +112,11 @@ class TorqueObjective(Objective):
         ]
 
     def list_swaps_within(self, kept: Subset, limit: float) -> list[tuple[int, int, float]]:
-        """Return the swaps that leave at most some error: the group removed, the group added, the error."""
+        """Return the swaps that leave an error of at most ``limit``: (removed, added, error) each.
+
+        These are all such swaps if groups are single columns and the subset is independent; otherwise at most one for
+        each removed group, with the best group of its width.
+        """
         improvement = self._compute_improvements(kept) if self.single else None
         if improvement is None:
             return [exchange for exchange in self._try_one_by_one(kept) if exchange[2] <= limit]
