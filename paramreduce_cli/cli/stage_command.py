@@ -1,5 +1,6 @@
 """Commands of the stages, derived from the signatures of the stages."""
 
+import inspect
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -102,12 +103,12 @@ def make_stage_command(name: str) -> click.Command:
 
 
 def _format_help(stage: Stage) -> str:
-    """Return the help of a stage: its docstring, and the files that it reads and writes."""
+    """Return the help of a stage: its docstring without sections, and the files that the stage reads and writes."""
     reads = [get_file(entry.type) for entry in stage.artifacts]
     source = " and ".join([", ".join(reads[:-1]), reads[-1]] if len(reads) > 1 else reads)
     flow = f"Reads {source or 'the config'}; writes {get_file(stage.output)}."
-    text = (stage.function.__doc__ or "").strip().replace("\n    ", "\n")
-    return f"{text}\n\n{flow}"
+    paragraphs = inspect.cleandoc(stage.function.__doc__ or "").split("\n\n")
+    return "\n\n".join([*(p for p in paragraphs if not p.startswith("Raises:")), flow])
 
 
 def _find_exit_code(stage: Stage, outcome: Outcome, quiet: bool) -> int:

@@ -43,8 +43,8 @@ _SEED = 0
 def build_model(robot: Robot, model: ModelSection, run: Run) -> Model:
     """Derive the model, its parameters and its base parameters.
 
-    The ranks are decided on seeded random states. An interruption leaves nothing: it takes less than
-    a minute for thirty joints.
+    The number of base parameters is determined on seeded random states. An interrupted run starts again; it takes less
+    than a minute for thirty joints.
 
     Raises:
         ConfigError: The nominal torque of a joint is zero and the config gives none.

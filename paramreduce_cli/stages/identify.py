@@ -45,7 +45,7 @@ def identify(
 ) -> Identification:
     """Identify base parameters and those of the selected model, with standard deviations.
 
-    Also physically consistent standard parameters, and hints where residuals are not noise.
+    The stage also finds physically consistent standard parameters, and gives hints if residuals are more than noise.
 
     Raises:
         DataError: The samples have no validation set.

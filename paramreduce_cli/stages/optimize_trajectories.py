@@ -39,7 +39,7 @@ def optimize_trajectories(
 ) -> Trajectories:
     """Find exciting trajectories, or take the Fourier coefficients that the config names.
 
-    Each trajectory is an item, which is kept at once: an interrupted run goes on with what is missing.
+    Each trajectory is an item, which is stored as soon as it is found: an interrupted run continues with the missing ones.
     """
     settings = trajectories
     period = settings.period if coefficients is None else coefficients.period

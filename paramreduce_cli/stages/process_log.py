@@ -27,7 +27,7 @@ def process_log(
 ) -> MeasuredLog:
     """Process logs: clean, filter, differentiate and split them.
 
-    What was done to them, and what looks wrong in them, is part of the result.
+    The result includes sentences on each processing step, and warnings about suspicious data.
 
     Raises:
         ConfigError: The config names no log.

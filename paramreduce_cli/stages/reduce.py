@@ -61,10 +61,9 @@ def reduce(
 ) -> Reduction:
     """Select parameters with each heuristic, for every number of them.
 
-    Works on any samples.h5, also one that a user brings: without a model all columns that
-    are not zero take part. Ctrl-C ends the search for proofs, and what is proven is kept; the
-    same command goes on from there. The items are the proofs of the sizes; jobs may also split the
-    search for every size.
+    The samples may be user-supplied; without a model the selection uses all columns that are not zero.
+    Ctrl-C ends the search for proofs and keeps those found so far; the same command continues from there.
+    The items are the proofs of the sizes; jobs may also divide the search of each size.
 
     Raises:
         DataError: The samples are of another robot, or too few.

@@ -63,10 +63,10 @@ def reduce_terms(
 ) -> TermReduction:
     """Prune negligible terms of the functions of reduced models, and fit the rest.
 
-    Parameters are fitted to the estimation set; errors of torques that the full model gave are kept
-    within 80 % of the budget there and on the validation set, so that those on the test set, which
-    is not looked at, are likely within it on the median. Measured ones are kept within it on the training part. A function for which nothing
-    is found is left out, with a warning. The items are the functions.
+    Parameters are fitted to the estimation set. If the full model gave the torques, errors stay within 80 % of the
+    budget on the estimation and the validation set, so that they are probably within the budget on the test set, which
+    the search does not use. If torques were measured, errors stay within the budget on the training part. A function
+    without any program within the budget is left out, with a warning. The items are the functions.
     """
     if section is None:
         raise ConfigError(

@@ -72,8 +72,8 @@ def report(
 ) -> Report:
     """Draw figures, make tables and write the page and summary.json.
 
-    Works on any samples.h5, also one that a user brings: without a model what is of a mechanism is
-    left out. Figures are SVG; --set report.formats=pdf,png draws others instead.
+    The samples may be user-supplied; without a model the sections on the mechanism are left out. Figures are SVG;
+    --set report.formats=pdf,png draws other formats instead.
     """
     # Late: every command that knows the stages would load Matplotlib and Jinja otherwise.
     from paramreduce_cli.report.figure_rendering import render_figures

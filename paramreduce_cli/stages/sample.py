@@ -73,8 +73,8 @@ def sample(
 ) -> Samples:
     """Sample the estimation, the validation and the test set: states, torques and observation matrices.
 
-    From the optimised trajectories, or from a log or recorded states where the config names them. The
-    items are trajectories, or pieces of a recording.
+    The states come from the optimised trajectories, or from a log, recorded states or a simulation if the config has
+    these. The items are trajectories, or pieces of a recording.
 
     Raises:
         DataError: A set has neither a recording nor a trajectory.

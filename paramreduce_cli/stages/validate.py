@@ -98,11 +98,11 @@ def validate(
 ) -> Validation:
     """Compute errors and costs of the reduced models on all sets.
 
-    Without a model, on samples that a user brings, torques alone are judged.
+    Without a model, on user-supplied samples, only torque errors are computed.
 
-    What was measured before on the same models and samples is judged anew, not measured again.
+    Errors of the same models on the same samples are taken from the previous run; only the judgement is repeated.
 
-    Exit code 0: the selected model is accepted; 1: it is not, with the sentence that says why.
+    The exit code is 0 if the selected model is accepted, and 1 otherwise, with a sentence that says why.
     """
     if model is None:
         _check_without_model(judging, section)
