@@ -35,7 +35,7 @@ def _find_files(folder: Path) -> dict[str, Path]:
 class Registry:
     """The functions of a subpackage by public name, each imported when it is first asked for.
 
-    A room makes it in its ``__init__``, so that it imports no files but its own.
+    A subpackage makes its registry in its ``__init__``, so that it imports no other files.
 
     Args:
         kind: Kind of the entries, for messages.

@@ -108,9 +108,8 @@ def _explain_failure(error: Exception) -> str:
 class PatientFile:
     """A file for HDF5 to write to, which stores its first error instead of raising it.
 
-    HDF5 cannot close a file whose disk is full and takes the process down at its end. So
-    after an error writing goes on into nothing, the file is closed in peace, and
-    :meth:`check` raises what happened.
+    HDF5 cannot close a file on a full disk, and crashes the process at its end. After an error all further writes are
+    therefore ignored, the file is closed, and :meth:`check` raises the error.
     """
 
     def __init__(self, path: Path) -> None:

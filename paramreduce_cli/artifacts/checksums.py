@@ -65,10 +65,10 @@ def write_checks(data: h5py.Dataset, array: np.ndarray) -> None:
 class CheckedRows:
     """A dataset that is read in slices of rows; each slice is compared with the dataset's checksums, if there are any.
 
-    Slices follow each other mostly: of the last block what was read is kept for the next one.
+    The last block stays in memory, because slices mostly follow one another.
 
     Args:
-        identifier: HDF5's own of the dataset: h5py's objects take longer than reading what is small.
+        identifier: Low-level identifier of the dataset; h5py's own objects take longer than reading small datasets.
     """
 
     def __init__(self, identifier: h5py.h5d.DatasetID) -> None:

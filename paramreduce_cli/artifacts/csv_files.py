@@ -32,8 +32,8 @@ class NumberTable(NamedTuple):
 def read_csv(path: Path, *, leave_out_text: bool = False) -> NumberTable:
     """Read the headings and numbers of a table, also gzipped.
 
-    Columns are separated by commas, tabs, semicolons or blanks, as the line of headings is. Numbers are held as numbers from
-    the start.
+    Columns are separated by commas, tabs, semicolons or blanks, like the headings. Cells are converted to numbers while
+    they are read.
 
     Args:
         path: The file.

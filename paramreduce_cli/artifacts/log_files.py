@@ -227,7 +227,8 @@ def _name_columns(
 ) -> dict[str, FloatArray]:
     """Name the columns of a topic, and their times: TOPIC/time of most columns, of others TOPIC/time_of/FIELD.
 
-    Several nodes may publish to one topic, each some joints; a column has the times of the messages that hold it.
+    Several nodes may publish some joints each under one topic, so each column has the times of the messages that
+    contain it.
 
     Args:
         topic: Name of the topic.

@@ -54,7 +54,7 @@ def _remove_former_files(folder: Path, files: set[str]) -> None:
 def save_files(folder: Path, files: Mapping[str, bytes]) -> None:
     """Write files of one kind to a folder, and remove those of the same kind that were there before.
 
-    What was written is listed in a hidden file, so that nothing else is touched.
+    A hidden file lists the written files, so that no other file is removed later.
     """
     listing = folder / _LISTING
     try:
@@ -92,8 +92,6 @@ def load_summary(path: Path) -> dict[str, Any]:
     """Read a summary, given its path or a results folder, and compare it with its digest.
 
     A summary without provenance, which somebody made by hand, has no digest.
-
-    One that somebody made has none, and then no provenance at all.
 
     Raises:
         ArtifactError: The summary is missing, damaged, or no summary.

@@ -27,8 +27,8 @@ _GROUP = "item"
 class StoredItems(MutableMapping[str, Any]):
     """A mapping of finished items by key, stored as files.
 
-    Each carries the digests of what it was made from; an item that is damaged, or made from anything else, counts as
-    absent.
+    Each item carries the digests of the inputs that it was made from. An item that is damaged, or made from other
+    inputs, counts as absent.
 
     Args:
         path: Path of the artifact that the items belong to.

@@ -20,7 +20,7 @@ _FEWEST_SAMPLES = 10
 def load_coefficients(path: Path) -> Coefficients:
     """Read Fourier coefficients.
 
-    HDF5 in the layout of trajectories.h5, or JSON in that of summary.json.
+    The file is HDF5 in the layout of trajectories.h5, or JSON in that of summary.json.
 
     Raises:
         DataError: The file holds no coefficients, or they are not all finite.

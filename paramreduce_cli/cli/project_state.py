@@ -26,7 +26,9 @@ def list_configs(folder: Path) -> list[Path]:
 
 
 def find_project_above(folder: Path) -> Path | None:
-    """Return the nearest folder above that has configs, relative to the given one, or None."""
+    """Return the nearest parent folder that holds configs, as a path relative to the given folder; None if there is
+    none.
+    """
     for k in range(1, _UP + 1):
         above = Path("/".join([".."] * k))
         if (folder / above / _CONFIGS).is_dir() and list_configs(folder / above):
@@ -79,7 +81,7 @@ def list_results(folder: Path) -> list[Path]:
 def find_config(folder: Path) -> Path | None:
     """Return the config that a results folder was made with; None if there is no such config here.
 
-    The artifacts know the name of its file, and of its robot.
+    Artifacts hold the name of the config's file and of the robot.
     """
     from paramreduce_cli.artifacts.hdf5 import read_stamp
 

@@ -168,8 +168,8 @@ def show_warning(message: Warning | str, category: type[Warning], *_: Any, **__:
 class Interruption:
     """A Ctrl-C or SIGTERM that cannot get lost.
 
-    A KeyboardInterrupt raised while a library calls back into Python may be swallowed there;
-    it is remembered and raised again at the next step of the work.
+    A library that calls back into Python may swallow a KeyboardInterrupt. The signal is therefore stored, and raised
+    again at the next step of the work.
     """
 
     def __init__(self) -> None:

@@ -29,8 +29,8 @@ _BY_HAND = "Take a config without --log, and write sampling.log with lists of co
 def guess_columns(names: Sequence[str], joints: Sequence[str]) -> dict[str, str | list[str]]:
     """Choose the columns of time, positions, speeds, accelerations and torques.
 
-    Joints are numbered from 0 or 1, or their names stand in the names of columns. Speeds and
-    accelerations are left out where no column has a usual name.
+    Joints are numbered from 0 or 1, or their names are part of the columns' names. Speeds and accelerations are
+    optional.
 
     Args:
         names: Names of all columns.

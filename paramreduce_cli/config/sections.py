@@ -37,7 +37,7 @@ def _walk(model: type[BaseModel], path: Key) -> Iterator[tuple[type, Key]]:
 
 
 def find_keys(name: str) -> list[str]:
-    """Return the keys of sections at the top that have a name."""
+    """Return the keys ``SECTION.NAME`` of all top-level sections that have a key of this name."""
     return [
         f"{path[0]}.{name}"
         for kind, path in _list_keys().items()

@@ -99,8 +99,6 @@ class Excitation:
         """Return the criterion and its derivative with respect to the coefficients, (n_dof, 1 + 2 harmonics).
 
         A barrier is added if torque or power are limited; the value is infinite beyond these limits.
-
-        With a barrier where torque or power are limited; infinite beyond the limits.
         """
         states = basis.evaluate(coefficients)
         weights = self._row_weights(states[0].shape[0])
@@ -136,8 +134,7 @@ class Excitation:
         """Return the logarithmic barrier of the bounds, infinite outside them, and its derivative with respect to the
         coefficients.
 
-        Each bound's row is replaced by its smooth maximum over time, which is never below the
-        true one. Infinite outside the bounds.
+        Each row of bounds is replaced by its smooth maximum over time, which is never below the true one.
         """
         if not self.quantities.constraints:
             return 0.0, np.zeros_like(coefficients)
@@ -217,7 +214,7 @@ class FreeObjective:
     def __call__(self, x: FloatArray) -> tuple[float, FloatArray]:
         """Value and gradient at ``x``, the unmixed free series stacked joint by joint.
 
-        Not a number outside the bounds and where the loops cannot be closed.
+        The value is NaN outside the bounds, and where the loops cannot be closed.
         """
         coefficients, pull = self._map_to_admissible(x)
         along = (self.basis, coefficients, self.level, self.positions)

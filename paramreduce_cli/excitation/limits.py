@@ -26,9 +26,8 @@ _FURTHEST = 0.999
 class LimitMap:
     """The map from free to admissible series on one grid.
 
-    A free series is an offset and harmonics. The harmonics are scaled to their limits by
-    themselves, so that no joint can meet its limit by being parked there; the offset moves
-    within the room that is left.
+    A free series is an offset and harmonics. The harmonics are scaled to their limits separately, so that no joint can
+    reach a limit by standing still near it; the offset moves within the remaining range.
 
     Args:
         limits: Limits of all joints.

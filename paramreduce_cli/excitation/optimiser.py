@@ -162,7 +162,6 @@ def optimise_trajectory(
 
     Raises:
         NumericalError: No motion keeps the bounds; the message names the bound that is exceeded.
-        NumericalError: No motion keeps the bounds; says which one stops it.
     """
     started = time.process_time()
     search = _Search(excitation, settings)
@@ -374,7 +373,7 @@ def describe(
 ) -> Trajectory:
     """Compute the figures of a trajectory: condition numbers, peaks, fractions of limits, and bounded quantities.
 
-    On the settings' grid, the bounded quantities on a finer one.
+    Bounded quantities are evaluated on a grid finer than that of the settings.
 
     Raises:
         DataError: The loops cannot be closed along it.

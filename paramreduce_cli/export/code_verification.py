@@ -27,8 +27,8 @@ def make_random_cases(
 ) -> dict[str, FloatArray]:
     """Return random states and the results of textbook recursion, by the names of the functions' arrays.
 
-    Where terms were left out, results are those of the simplified program, which textbook recursion does
-    not know; states are inside the ranges that it holds in, those of loops anywhere.
+    For a function with pruned terms, results are those of the pruned program, and states of open trees are inside the
+    ranges in which it holds.
 
     Args:
         mechanism: Mechanism of the robot.
@@ -153,7 +153,7 @@ def measure_single_precision(
     """Return the largest rounding error of each result in single precision, relative to the largest value of the
     result.
 
-    That is with NumPy's sines and without contraction; compiled code has been found 1.5 times as far off.
+    NumPy's sines are used, and no fused operations; compiled code was found to have errors 1.5 times as large.
 
     Args:
         functions: Functions with their arguments and results.

@@ -110,8 +110,8 @@ def _make_inertial(name: str, body: FloatArray) -> Inertial | None:
 def _sum_drives(mechanism: Mechanism, standard: FloatArray) -> dict[str, dict[str, float]]:
     """Return the sums of the drives' parameters that act on the joint of each body, by the keys of a drive in a config.
 
-    Of drives along one coordinate, seen from that: with a weight w, inertia, friction and stiffness of
-    a drive are w^2 times as large there, Coulomb friction w times.
+    A drive with weight w adds w^2 times its inertia, friction and stiffness to the coordinate, and w times its Coulomb
+    friction.
     """
     result: dict[str, dict[str, float]] = {}
     for drive in mechanism.drives:

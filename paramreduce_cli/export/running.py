@@ -29,7 +29,7 @@ void repeated(long rounds, long n, const double *phi, const double *const *in, d
 class RunningModel:
     """The inverse or the direct dynamics of a model, from its exported C code; with loops, R and b are handed in.
 
-    Without a compiler its expressions are evaluated in Python.
+    Without a compiler the model's expressions are evaluated in Python.
 
     Args:
         model: Model of the robot.

@@ -30,9 +30,6 @@ def find_cache_folder() -> Path:
     """Return the folder of compiled models: ``$PARAMREDUCE_CACHE`` or the user's cache.
 
     It is a temporary folder of this process if that folder cannot be made, or if other users could place code in it.
-
-    A temporary folder of this process where that cannot be made, or where others could put
-    something there that would be run.
     """
     try:
         folder = _get_preferred_folder()

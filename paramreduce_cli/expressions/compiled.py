@@ -199,7 +199,6 @@ def _load_library(command: list[str], text: str, path: Path) -> ctypes.CDLL:
 
     Raises:
         OSError: The folder does not allow writing files or running code.
-        OSError: Nothing can be written there, or run from there.
         subprocess.CalledProcessError: The compiler fails.
     """
     if not is_kept(path):

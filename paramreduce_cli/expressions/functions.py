@@ -31,7 +31,7 @@ class Argument:
 class Function:
     """A straight-line function.
 
-    The inputs of its program count on through the arguments, its outputs through the results.
+    The program's inputs are the arguments one after the other; its outputs are the results one after the other.
     """
 
     name: str

@@ -51,7 +51,6 @@ def _read_checked(path: str) -> bytes:
 
     Raises:
         OSError: The file cannot be read, or its content does not match the checksum.
-        OSError: It cannot be read, or its checksum does not fit.
     """
     content = Path(path).read_bytes()
     if hashlib.sha256(content[:-_DIGEST]).digest() != content[-_DIGEST:]:
@@ -68,7 +67,7 @@ def _stamp_files(source: Path) -> tuple[tuple[str, float, int], ...]:
 def inline(function: Loop) -> Loop:
     """Inline a function in the compiled functions that call it, if these are few.
 
-    A function that is compiled by itself is compiled again, with all that it calls, in each of its callers.
+    A function that is not inlined is compiled again, with all that it calls, in each of its callers.
     """
     made: Loop = numba.njit(inline="always")(function)
     return made

@@ -27,7 +27,7 @@ _DIGITS = 6
 def rescale(program: Program, n: int) -> tuple[Program, FloatArray]:
     """Return the same function of inputs in other units, chosen so that few products with constants are left.
 
-    Those that vanish together in most places are made to first, then others as far as these leave it open.
+    Constants that occur in many products are eliminated first, then others as far as the units are still free.
 
     Args:
         program: Program of sums, products and functions, numbers folded as a :class:`Graph` folds them.

@@ -87,7 +87,10 @@ def tidy(rows: Rows) -> None:
 
 @within
 def _resolve(rows: Rows, n: int) -> None:
-    """Replace a row that has only one term by this term wherever the row is used; terms of products are never negative."""
+    """Replace a row that has only one term by this term wherever the row is used.
+
+    Products keep the row if the term is negative, because terms of products are never negative.
+    """
     width = rows.terms.shape[1]
     negative = rows.terms[n, 0] & 1
     slot = rows.numbers[n, HEAD]

@@ -15,8 +15,6 @@ def unwrap_positions(z: FloatArray) -> tuple[int, ...]:
 
     A step counts as a revolution if the positions before and after it continue each other without it.
 
-    A step counts as a whole turn where the positions before and after it go on as if it were not there.
-
     Args:
         z: Positions, rad, (n_rows, n_dof).
 

@@ -174,9 +174,6 @@ class LinearFit:
         """Coloured noise of each joint.
 
         The fit absorbs slow noise; how much is estimated from simulated noise that is fitted alike, and added back.
-
-        A fit takes slow noise out of its residuals; the loss is estimated from simulated noise that is fitted alike,
-        and added back.
         """
         n_dof, n = self.deviation.size, self.rows.n_samples
         seen = [estimate_autocovariance([e[:, j] for e in self.residuals]) for j in range(n_dof)]

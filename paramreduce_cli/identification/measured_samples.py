@@ -88,8 +88,8 @@ def _find_last_samples(edges: IntArray, outputs: range) -> list[int]:
 class LoggedSet:
     """A set of measured samples, computed as they are read; each fold counts as a trajectory.
 
-    If torques pass a low-pass, every column of the observation matrix passes the same one, so that the model stays
-    linear and exact [Gautier1997]; states are those at the sample's own time. Only slices of the motions are read.
+    If torques are low-passed, every column of W passes the same filter, so that the model stays linear and exact
+    [Gautier1997]; states are not filtered again. Only slices of the motions are read.
     """
 
     motions: MeasuredMotions

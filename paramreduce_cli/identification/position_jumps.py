@@ -42,10 +42,9 @@ class PositionJumps:
 def find_position_jumps(signals: Signals) -> PositionJumps:
     """Find runs of bad rows, and steps after which positions stay changed.
 
-    The recording is followed from its longest stretch without jumps to both ends. What lies between two
-    stretches that the joints can reach from each other is bad; where no stretch within a quarter of a second can be
-    reached a step stays. A stretch between jumps that holds the same numbers throughout is bad, and so are rows with the
-    numbers of a bad row.
+    The recording is followed from its longest stretch without jumps towards both ends. Rows between two stretches that
+    the joints can reach from each other are bad. If no stretch within a quarter of a second can be reached, the step is
+    kept. A stretch of constant numbers between jumps is bad, and so are rows with the numbers of a bad row.
 
     Args:
         signals: A recording with all of its rows.

@@ -17,9 +17,9 @@ _SLIP = 1e-8
 def unround_angle(text: str) -> float:
     """Return the angle that a number was rounded, or cut off, from, rad.
 
-    The more digits the number has the finer the angles it can stand for: quarter turns with two digits after
-    the point, eighths with three, multiples of 15 degrees with four or more. Numbers with fewer than three digits are not
-    taken for cut off.
+    The more digits a number has, the finer are the angles that it can stand for: quarter turns with two decimals,
+    eighths with three, multiples of 15 degrees with four or more. Numbers with fewer than three digits are not taken
+    for truncated.
 
     Args:
         text: The number as it is written.

@@ -382,8 +382,8 @@ class MjcfReader:
     def separate_inertia(
         self, body: ImportedBody, robot: SimplifiedRobot, whole: Inertial | None
     ) -> Inertial:
-        """Return the inertia of a body's own link, without the links that move with it, in the frame of that link in
-        the file.
+        """Return the inertia of a body's own link, in the frame of that link in the file, without the links that are
+        fixed to the body.
         """
         parts = [whole or Inertial()]
         for link, carrier in robot.merged.items():

@@ -32,7 +32,7 @@ def write_mjcf(
 ) -> bytes:
     """Return an MJCF file with other parameters; everything else stays.
 
-    Bodies that move with another keep their inertia, which is subtracted from that other body.
+    Bodies that are fixed to another body keep their inertia, which is subtracted from the inertia of that body.
 
     Args:
         path: File, which was read before.

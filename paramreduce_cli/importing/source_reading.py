@@ -23,7 +23,7 @@ def read_robot(source: SourceSection) -> SimplifiedRobot:
 def find_described_robot(name: str) -> Path | None:
     """Return the file of a robot that the package robot_descriptions knows by name, such as ur5_description, or None.
 
-    The package fetches it on first use. None where there is no such package or name.
+    The package fetches the file on first use. The result is None if there is no such package or name.
 
     Raises:
         ConfigError: The package cannot bring it.

@@ -21,7 +21,8 @@ def write_urdf(
 ) -> bytes:
     """Return a URDF file with other parameters.
 
-    Links that move with another lose their inertia to that link, as in the config; links that do not move keep it.
+    The inertia of links that are fixed to another link is moved to that link, as in the config; links fixed to the base
+    keep theirs.
 
     Args:
         path: File, which was read before.

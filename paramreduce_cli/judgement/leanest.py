@@ -20,9 +20,9 @@ def find_leanest(
 ) -> Leanest | None:
     """Return the function with the fewest operations whose errors are within the tolerances, or None.
 
-    The tolerances are those under ``selected``, on both sets; else the budgets within which terms were removed, on the
-    sets of these budgets; else the defaults. Errors of accelerations count for the direct dynamics alone, whose mass
-    matrices must be positive definite on both sets.
+    The tolerances are those under ``selected`` for both sets; without these, the budgets of pruned terms for their
+    sets; without these, the defaults. Errors of accelerations count for the direct dynamics only, whose mass matrices
+    must be positive definite on both sets.
 
     Args:
         function: ``inverse`` or ``direct``.

@@ -46,8 +46,8 @@ def find_smallest_within(
 ) -> Pick | None:
     """Return the model with the fewest parameters that keeps all tolerances on both sets, or None.
 
-    With a tolerance of operations alone it is the model with the smallest error instead. Of several with as many
-    parameters it is the one with the smallest torque error on the estimation set; among equals the last heuristic's.
+    If only operations have a tolerance, the model has the smallest error instead. Of several models of that size the
+    one with the smallest torque error on the estimation set is returned; of equal ones that of the last heuristic.
     """
     good = [
         (name, int(row))
@@ -107,8 +107,8 @@ def is_proven_smallest(proofs: Proofs, n: int, torque_error: float) -> bool:
 def find_pareto_front(results: Mapping[str, HeuristicValidation]) -> tuple[ModelChoice, ...]:
     """Return the models with known operations that no other model beats in one respect without losing in another.
 
-    Compared are the number of parameters, both errors on the estimation set and both operation counts; models with
-    errors of 100 % are left out. Of equal models the first stays.
+    The quantities are the number of parameters, both errors on the estimation set and both numbers of operations.
+    Models with errors of 100 % are left out; of equal models the first stays.
     """
     picks = list(_iterate_sensible(results))
     if not picks:

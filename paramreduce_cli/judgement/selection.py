@@ -33,8 +33,8 @@ def select_model(
 ) -> Selected:
     """Return the model of the size that the config asks for, or the smallest model within the tolerances on both sets.
 
-    If no model keeps the tolerances it is the nearest one, with a note. With cross-validation it is the smallest model
-    that the data cannot distinguish from the best.
+    If no model keeps the tolerances, the nearest one is returned, with a note. With cross-validation, it is the
+    smallest model that the data cannot distinguish from the best.
 
     Args:
         section: Limits of the config.

@@ -18,7 +18,7 @@ _remembering: list[Any] = []
 def cache_expressions(function: F) -> F:
     """Return a function of expressions that is evaluated once for equal arguments.
 
-    Formulations that are compared differ at one joint, and most of what they need is the same.
+    The formulations in a search differ at one joint, so most expressions are the same.
     """
     known = lru_cache(_MOST)(function)
     _remembering.append(known)

@@ -68,8 +68,6 @@ def list_alternatives(choice: JointFormulation, joint: Joint) -> list[JointFormu
     """List the formulations of a joint that differ in one choice, or in the recursion step of several inertia parts.
 
     Projections of wrenches are varied by :func:`list_distant_alternatives` instead.
-
-    Whether wrenches are projected is for :func:`list_distant_alternatives` alone.
     """
     names = _list_effective_fields(choice, joint)
     steps = tuple(InertiaPlace) if joint.revolute else (InertiaPlace.OWN, InertiaPlace.BEFORE)

@@ -107,8 +107,7 @@ def _split_rotation_about_z(turn: FloatArray) -> tuple[FloatArray, float]:
     """Split a rotation matrix into a rotation about z, applied first, and the rest; the angle is zero if the matrix is
     a permutation of axes.
 
-    Turns by quarters cost nothing where they are; others, about other axes, need fewer products
-    without.
+    Permutations of axes cost no operations; for others, taking out the rotation about z saves products.
     """
     if np.all((turn == 0) | (np.abs(turn) == 1)) and _has_tilt(turn):
         return turn, 0.0

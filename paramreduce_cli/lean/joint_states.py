@@ -97,9 +97,6 @@ class JointState:
 
     Its frame at rest is the frame that the body's angle is measured against: that of the joint, or, where parallel axes
     are aligned, that of the first of them.
-
-    The frame at rest is the one the body's angle is measured against: that of the joint, or
-    where parallel axes are aligned, that of the first of them.
     """
 
     joint: Joint

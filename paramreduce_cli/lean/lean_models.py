@@ -52,7 +52,7 @@ class _Variants:
 def get_lean_models(model: Model, *, independent: bool = False) -> LeanModels:
     """Return the lean models of a robot; those of the last robots are kept.
 
-    Those of the robots asked for last are kept: all formulations of an arm of six joints take half a second to write.
+    The lean models of the last robots stay in memory: building all formulations of a six-joint arm takes half a second.
 
     Args:
         model: Model of the robot, with formulations to choose from.
@@ -82,8 +82,8 @@ def _make_lean_models(same: _SameModel, independent: bool) -> LeanModels:
 class LeanModels:
     """Programs of the inverse and direct dynamics for any set of parameters.
 
-    Their inputs are the standard parameters, then q, dq and ddq, and for loops, if the independent
-    coordinates are asked for, the dependent rows of R, row by row, and of b.
+    Inputs are the standard parameters, then q, dq and ddq. For the independent coordinates of loops, the rows of R and
+    of b for the dependent coordinates follow, row by row.
 
     Args:
         model: Model of the robot, with formulations to choose from.

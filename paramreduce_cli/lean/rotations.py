@@ -23,12 +23,12 @@ class JointRotation:
     sine: Scalar
 
     def to_parent(self, a: Vector) -> Vector:
-        """Return a vector's components before the rotation, Rz a, from those in the rotated frame."""
+        """Return a vector's components in the parent's frame, Rz a, from those in the rotated frame."""
         c, s = self.cosine, self.sine
         return (c * a[0] - s * a[1], s * a[0] + c * a[1], a[2])
 
     def to_child(self, a: Vector) -> Vector:
-        """Return a vector's components in the rotated frame, Rz' a, from those before the rotation."""
+        """Return a vector's components in the rotated frame, Rz' a, from those in the parent's frame."""
         c, s = self.cosine, self.sine
         return (c * a[0] + s * a[1], c * a[1] - s * a[0], a[2])
 
@@ -36,8 +36,8 @@ class JointRotation:
     def rotate_inertia(self, body: Inertia) -> Inertia:
         """Return the inertia in the frame before the rotation: Rz I Rz' and the rotated first moments.
 
-        The xx-yy-xy block turns by the double angle; with w = s (Ixx - Iyy) + 2 c Ixy it loses
-        s w in xx, gains it in yy, and xy becomes c w - Ixy.
+        The xx-yy-xy block rotates by the double angle: with w = s (Ixx - Iyy) + 2 c Ixy, xx becomes Ixx - s w, yy
+        becomes Iyy + s w, and xy becomes c w - Ixy.
         """
         c, s = self.cosine, self.sine
         xz, yz, _ = self.to_parent((body.xz, body.yz, body.zz))

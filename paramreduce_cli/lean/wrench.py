@@ -14,7 +14,7 @@ from paramreduce_cli.lean.inertia_expressions import Inertia
 class Gauge(StrEnum):
     """A part of a body's inertia, s (1 - z z'), that is handed to the parent body.
 
-    A hinge about z cannot tell it apart, so s is chosen for the rest to be simple.
+    A hinge about z does not distinguish it from inertia of the parent body, so s is chosen to make the rest simple.
     """
 
     NONE = "none"
@@ -125,9 +125,9 @@ def compute_force_along_z(body: Inertia, frame: FrameMotion, a: Vector) -> Scala
 def compute_rotation_wrench(body: Inertia, turning: RotationEffect) -> Wrench:
     """Return the additional wrench that a body needs because its frame rotates about z.
 
-    With C = U_after - U_before and S the second moments, it is C d and the skew part of C S, of
-    which C leaves little: twice S_xx is Izz - (Ixx - Iyy), twice S_yy is Izz + (Ixx - Iyy), and
-    the moment about z has nothing but the angular acceleration.
+    With C = U_after - U_before and S the second moments, the force is C d and the moment the skew part of C S. Only few
+    entries of C differ from zero: twice S_xx is Izz - (Ixx - Iyy), twice S_yy is Izz + (Ixx - Iyy), and the moment
+    about z depends on the angular acceleration alone.
     """
     (h, k), acceleration, loss = turning.half, turning.acceleration, turning.loss
     difference, twice = body.xx - body.yy, 2 * body.xy

@@ -91,9 +91,10 @@ def _choose_revolutions(
     along: Callable[[FloatArray], State],
     pose: FloatArray,
 ) -> FloatArray:
-    """Return the whole turns of joints that bring the start of a trajectory nearest to a pose, within limits, (n_dof,).
+    """Return the numbers of whole revolutions of joints that bring the start of a trajectory nearest to a pose within
+    the limits, (n_dof,).
 
-    After a turn a joint of an open tree is where it was, but the way there may be another one, or none.
+    A joint of an open tree has the same pose after a whole revolution, but the path to it may differ or not exist.
     """
     drives = [p.kind for p in mechanism.parameters]
     if mechanism.loops is not None or Kind.STIFFNESS in drives:

@@ -38,8 +38,8 @@ def find_affecting_columns(W: FloatArray) -> BoolArray:
 def find_affecting_parameters(mechanism: Mechanism, K: FloatArray) -> BoolArray:
     """Find the parameters whose effect on some joint is not zero to rounding.
 
-    Effects are compared joint by joint, and in units in which the mechanism has the size one: so neither the
-    size of the robot, nor a column of another unit, nor a joint with far larger torques hides an effect.
+    Effects are compared joint by joint, in units in which the mechanism has the size one. So neither the size of the
+    robot, nor the unit of a column, nor a joint with much larger torques hides an effect.
 
     Args:
         mechanism: The robot.

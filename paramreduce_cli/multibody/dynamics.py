@@ -173,10 +173,8 @@ class ObservationFunction:
     def compute_vector_jacobian_product(
         self, q: FloatArray, dz: FloatArray, ddz: FloatArray, W_bar: FloatArray
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return the derivative of a function with respect to the independent coordinates, given its derivative with
-        respect to W. The closure equations relate the derivatives: dq/dz = R.
-
-        The derivative by z is taken through the position problem: dq/dz = R.
+        """Return the derivatives of a function with respect to positions, velocities and accelerations of the
+        independent coordinates, given its derivative with respect to W.
 
         Args:
             q: Generalised coordinates, (n_samples, n_q).

@@ -13,8 +13,8 @@ DEPENDENT = 1e-9
 class Orthogonaliser:
     """A set of unit columns and a vector, from which the components along chosen columns are removed.
 
-    Modified Gram-Schmidt: a column that is taken is orthogonalised once more, and its direction is
-    removed from all others.
+    The method is modified Gram-Schmidt: a chosen column is orthogonalised once more, then its direction is removed from
+    all others.
 
     Args:
         X: Columns of unit length or zero, (k, n).

@@ -19,8 +19,7 @@ def draw_states(
     """Return random states: angles anywhere, slides as long as the mechanism, normally distributed speeds and
     accelerations.
 
-    Those of loops are reached from the assembly by random moves, as far as these go without
-    coming near a singular configuration.
+    States of loops are reached from the assembly by random moves that stay away from singular configurations.
 
     Args:
         mechanism: Mechanism with assembled loops, if any.

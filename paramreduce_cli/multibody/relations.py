@@ -98,9 +98,6 @@ def approximate_expressions(
 
     The terms with the largest share of the value come first; the text states only the number of the smallest ones.
 
-    All terms of one stand before the same column of the observation matrix, so that their shares of the
-    value are their shares of the torque: the largest come first, and the smallest are counted.
-
     Args:
         names: Names of all parameters, (n,).
         kept: Columns of the approximate base parameters, (n_kept,).

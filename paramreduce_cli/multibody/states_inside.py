@@ -24,9 +24,9 @@ States = tuple[FloatArray, FloatArray, FloatArray]
 class StatesInside:
     """A sampler of random states inside limits and constraints.
 
-    Positions of loops are reached from known ones by random moves, as far as the loops can be followed and come no
-    nearer to a singular configuration than the known ones. Velocities, then accelerations are shortened until those of
-    the dependent coordinates are inside their limits too.
+    Positions of loops are reached from known ones by random moves that come no nearer to a singular configuration than
+    the known ones. Velocities and accelerations are reduced until those of the dependent coordinates are inside their
+    limits too.
 
     Args:
         mechanism: The mechanism.

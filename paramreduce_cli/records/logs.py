@@ -50,8 +50,7 @@ class RawLogs:
 class MeasuredMotions:
     """A sequence of measured motions, evenly spaced in time within each piece.
 
-    Arrays of long motions stay in a file: they give forward slices as arrays do, and become arrays by
-    ``numpy.asarray``.
+    Arrays of long motions stay in a file: slices can be read in order, and ``numpy.asarray`` reads the whole array.
     """
 
     time: FloatArray

@@ -14,11 +14,10 @@ from paramreduce_cli.records.representation import record
 class Kind(Enum):
     """A kind of parameter: its symbol, unit, formula, and rank of preference in a base.
 
-    The smaller the rank, the more a kind is wanted among the base parameters. For revolute arms
-    these ranks yield Khalil's set [Khalil1987]: Izz of the first body and seven parameters of every
-    other one, with Iyy, mz and m regrouped. In formulas m with an axis is the first moment.
-    Units of what belongs to a drive are those of one that turns; one that slides has N for N m and
-    m for rad.
+    The smaller its rank, the more a kind is preferred as a base parameter. For revolute arms these ranks yield Khalil's
+    set [Khalil1987]: Izz of the first body and seven parameters of every other one, with Iyy, mz and m regrouped. In
+    formulas m with an axis is the first moment. Units of drives are those of rotating ones; sliding drives have N for N
+    m and m for rad.
     """
 
     M = ("m", "kg", 9, "m", "")

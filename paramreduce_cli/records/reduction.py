@@ -47,7 +47,7 @@ class SelectionMethod:
 class ReducedModel:
     """A model that keeps some values: which standard parameter has which of them.
 
-    The full model, base parameters and every subset are of this form.
+    The full model, the base parameters and every subset have this form.
     """
 
     names: tuple[str, ...]

@@ -25,8 +25,8 @@ class Fit:
 def fit(problem: SelectionProblem, subset: IntArray) -> Fit:
     """Fit a subset: phi'_R = W_R^+ chi and beta = W_R^+ W_E [Ros2019], Eqs. 17 and 20.
 
-    Columns are scaled to unit length first, so the minimum norm of a dependent subset is that
-    of the torques each parameter causes and does not depend on units.
+    Columns are scaled to unit length first. The minimum norm of a dependent subset is therefore that of the torques of
+    the parameters, and does not depend on units.
     """
     others = np.setdiff1d(np.arange(problem.W.shape[1]), subset)
     right = np.column_stack([problem.W[:, others], problem.chi])

@@ -20,7 +20,7 @@ _STIFF = 1e-6
 
 
 def list_choices(reduction: Reduction) -> list[str]:
-    """List what :class:`ModelChoice` may be: a word for each heuristic, with all sizes if groups leave some out."""
+    """List the possible model choices, a text for each heuristic: ``swap:1...7``, or with groups ``swap:2|4|6``."""
     return [
         f"{name}:{f'1...{found.n[-1]}' if found.n[-1] == found.n.size else '|'.join(map(str, found.n))}"
         for name, found in reduction.heuristics.items()

@@ -26,8 +26,8 @@ def compute_residual_rms(factors: FloatArray, parameters: FloatArray, n_samples:
 def estimate_joint_noise(factors: FloatArray, scale: FloatArray, n_samples: int) -> FloatArray:
     """Return the standard deviation of each joint's torque noise, (n_dof,); infinite where no torque is measured.
 
-    The fit is iterated weighted least squares on all parameters [Gautier1997], corrected for the degrees of freedom
-    that it uses.
+    The method is iterated weighted least squares on all parameters [Gautier1997], corrected for the degrees of freedom
+    of the fit.
 
     Args:
         factors: Triangular factors of [W | tau] per trajectory and joint.

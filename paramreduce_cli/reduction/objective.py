@@ -66,7 +66,7 @@ class Objective(ABC):
         """Return the subset after the best swap of one group for another of the same width, or the subset itself if no
         swap helps.
 
-        The subset itself where none is promising.
+        The subset itself is returned if no swap is promising.
         """
 
     @cached_property

@@ -50,7 +50,7 @@ class SelectionProblem:
     def groups(self) -> list[IntArray]:
         """Groups of columns that are kept or dropped together, most of one column, the most preferred first.
 
-        A group stands where its most preferred member does, with its members in order of preference.
+        A group has the position of its most preferred member; its members are in order of preference.
         """
         owner = {int(column): k for k, group in enumerate(self.joined) for column in group}
         found: dict[int, list[int]] = {}

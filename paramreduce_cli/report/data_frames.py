@@ -30,11 +30,11 @@ def make_data_frame(
 ) -> pd.DataFrame:
     """Return a record as a table of pandas, which must be installed.
 
-    Of a model the standard parameters, a row each: name, body, kind, unit, value, affecting. Of trajectories
-    set, number and the numbers that each has reached. Of a reduction all models: heuristic, n,
-    torque_error, parameters; of a validation heuristic, n, and errors and operations of every model, but for
-    single joints. Of a reduced model its parameters: name, value, stands_for. Of an identification
-    those of both models: model, name, value, deviation, the standard deviation.
+    The rows are: of a model its standard parameters (name, body, kind, unit, value, affecting); of trajectories each
+    trajectory (set, number, and its figures); of a reduction all subsets (heuristic, n, torque_error, parameters); of a
+    validation all subsets (heuristic, n, errors of all joints together, operations); of a reduced model its parameters
+    (name, value, stands_for); of an identification the parameters of both models (model, name, value, deviation, which
+    is the standard deviation).
 
     Args:
         record: Record to convert.

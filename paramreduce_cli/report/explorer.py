@@ -26,8 +26,8 @@ _FUNCTIONS = ("inverse", "direct")
 def pack_explorer(data: ReportData) -> dict[str, Any]:
     """Return everything that the explorer shows as plain data with packed arrays.
 
-    Torques are not embedded but the observation matrix of one motion, in single precision: the page
-    multiplies it with the parameters of whichever model is looked at.
+    The observation matrix of one motion is embedded in single precision instead of torques: the page multiplies it with
+    the parameters of the shown model.
 
     Args:
         data: Records that the report shows.
@@ -61,7 +61,7 @@ class _Models:
         self._values: list[np.ndarray] = []
 
     def number_model(self, choice: ModelChoice) -> int:
-        """Return the number of a heuristic's model; -1 if the model does not exist."""
+        """Return the index of a heuristic's model, which is added if it is new; -1 if the model does not exist."""
         row = choice.find_row(self._reduction)
         if row is None:
             return -1
@@ -109,7 +109,7 @@ def _list_curves(data: ReportData, library: _Models) -> list[dict[str, Any]]:
 
 
 def _list_errors(data: ReportData, result: HeuristicValidation) -> dict[str, Any]:
-    """Return errors and costs of all models of a heuristic."""
+    """Return the errors, the operations and the properties of the mass matrix of all models of a heuristic."""
     counted = data.model is not None
     return {
         "torque": {s: pack_array(_get_errors(result, "torque", s)) for s in SETS},
@@ -191,8 +191,8 @@ def _pack_animation(data: ReportData) -> dict[str, Any] | None:
     """Return the mechanism along its motions, points in the base frame and lines between them by body; None without a
     robot.
 
-    Coordinates are embedded as shares of the box that they move in, in 16 bits: a step is
-    much less than a pixel.
+    Coordinates are embedded in 16 bits as fractions of the box that contains all motions; a step is much less than a
+    pixel.
     """
     shown = data.animation
     if shown is None:

@@ -84,7 +84,7 @@ def make_animation(model: Model, motions: Mapping[str, FloatArray]) -> Animation
 def _iterate_lines(shown: Skeleton) -> Iterator[tuple[int, int, int, str]]:
     """Yield the lines of a pose: points by number, base first, and the body that each line belongs to.
 
-    What leads from a body's frame to the next joint is part of that body, not of the next one.
+    The line from a body's frame to the next joint belongs to that body.
     """
     count = len(shown.parents)
     for body, parent in enumerate(shown.parents):

@@ -221,7 +221,7 @@ def _find_tied_sizes(a: Summary, b: Summary, name: str) -> set[int]:
 def _find_open_sizes(a: Summary, b: Summary, name: str) -> set[int]:
     """Return the sizes whose proof ended in one run alone; their subsets are left to chance.
 
-    That the two do not contradict each other is looked at with the proofs.
+    Contradictions between the two are found when proofs are compared.
     """
     if name != "best-subset":
         return set()

@@ -163,8 +163,8 @@ class Sweep:
     def list_phases(self, jobs: str) -> list[list[str]]:
         """Return commands that can run side by side, in phases of which each waits for the one before.
 
-        What needs no other job than its own run is one command; so there are no more than two phases for
-        every stage that is done as several jobs, and two.
+        Stages that need no other jobs than those of their own run are one command. So there are at most two phases for
+        every stage that is divided into jobs, and two more.
 
         Args:
             jobs: Number of processes for a stage, as the shell understands it.

@@ -89,7 +89,7 @@ def _say_other_modes(
 ) -> None:
     """Warn if the loops have another assembly mode with a different number of base parameters.
 
-    A guess that leads to the wrong one of them is seen by this alone.
+    Nothing else shows that the guess leads to the wrong assembly mode.
     """
     if mechanism.loops is None:
         return

@@ -197,8 +197,8 @@ def _choose_samples(
 ) -> SearchSamples:
     """Return the samples for fitting parameters and for watching errors during the search.
 
-    If torques are measured both are of the training part, with quarters of it in turn, as one motion alone says little
-    about another.
+    If torques are measured, both sets are quarters of the training part in turn, because one motion says little about
+    another.
     """
     if judge.measured:
         some = judge.decimate(samples.estimation, searched + watched)

@@ -184,7 +184,7 @@ def _complete_series(
     """Return the images of all series under the symmetries of the mechanism, or raise an error if one leaves the
     limits.
 
-    Those that lead out of the limits are refused: they are none of this mechanism.
+    If an image leaves the limits, ConfigError is raised: the symmetry is then none of the mechanism with its limits.
     """
     series = complete_series(
         series, generate_group(sampling.symmetries, model.mechanism.coordinate_names)

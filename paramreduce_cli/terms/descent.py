@@ -158,8 +158,8 @@ class Descent:
     ) -> Descent:
         """Return a descent from a program shortly before the end of another descent, written in another way.
 
-        With sums and products rearranged differently it has other terms to remove. Candidates of the other descent are
-        kept, as on other samples a costlier program may be the better one to continue from.
+        With its sums and products rearranged, the program has other terms to remove. Candidates of the other descent
+        are kept, because on other samples a program with more operations may be the better one to continue from.
 
         Args:
             history: History of the descent.
@@ -194,8 +194,8 @@ class Descent:
     def descend(self, noise: float = 0.0) -> SearchHistory:
         """Remove terms until none can go, also terms that appear by rewriting.
 
-        A rewritten program has other terms than before, and shares more subexpressions. It is rewritten early, too, as
-        which terms are cheap to remove depends on what the others share.
+        A rewritten program has other terms, and shares more subexpressions. The program is rewritten early, too,
+        because which terms are cheap to remove depends on what the others share.
 
         Args:
             noise: Standard deviation of noise on the logarithm of estimated costs, until no more can go with it.

@@ -168,7 +168,7 @@ class Evaluator:
     def compute_worst_ratio(self, errors: tuple[Errors, Errors], budget: Budget) -> float:
         """Return the largest error over its budget; infinite if an error is NaN.
 
-        If torques were measured, the held-out set does not count.
+        If torques were measured, the held-out set is left out.
         """
         no_other = self.measured or self._samples.validation is None
         kinds = 2 if self.direct else 1

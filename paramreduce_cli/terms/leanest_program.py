@@ -76,10 +76,6 @@ def simplify(
     Descents begin at the starts, then near the best ends with formulations changed at random, then from programs
     shortly before the best ends, written in other ways; the best ends are finished with more samples.
 
-    Starts are gone down from, each in the formulation that is leanest for it, then others near the best ones, whose
-    formulations are changed at random, as long as that helps; then, as long as that helps, once more from programs
-    shortly before the best ends, written in other ways; from the best ends it goes on with more samples.
-
     Args:
         searcher: Goes down from them.
         starts: Subsets, the smallest first; how many are gone down from depends on their operations.

@@ -34,10 +34,7 @@ class Start:
     """Formulation of the start; None for the leanest."""
 
     def build_program(self, lean: LeanModels, *, direct: bool) -> Program:
-        """Return the program with all terms, not rewritten; its first inputs are the parameters of the model.
-
-        It is not rewritten yet, as its terms are not those that are left in the end.
-        """
+        """Return the program with all terms, not rewritten; its first inputs are the parameters of the model."""
         if self.formulation is not None:
             lean = lean.restrict_to(self.formulation, direct=direct)
         program = (lean.build_direct if direct else lean.build_inverse)(self.model, rewritten=False)
@@ -73,7 +70,7 @@ def list_starts(
 def order_by_estimate(starts: list[Start], smallest: int) -> Iterator[Start]:
     """Yield starts, the most promising first: the leanest of every size, then the second of every size, and so on.
 
-    What a larger subset has besides may cost little once terms are left out, and make up for these.
+    The additional terms of a larger subset may cost little after pruning, and may allow to remove others.
 
     Args:
         starts: Starts from :func:`list_starts`.
@@ -101,7 +98,7 @@ def vary_start(
 ) -> Start:
     """Return a start near another one: its formulation is varied, and sometimes its subset is replaced.
 
-    Which formulation takes the fewest operations once terms are left out cannot be told before.
+    Which formulation takes the fewest operations after pruning cannot be predicted.
 
     Args:
         start: Start to vary.

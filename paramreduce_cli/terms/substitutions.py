@@ -57,10 +57,10 @@ def find_substitutions(
 ) -> Substitutions:
     """Return the most promising replacements of nodes by multiples of earlier nodes.
 
-    With w the weighed derivatives of the rows by node k, v values, and r the residual, the cost of
-    c v_j in place of v_k is c^2 sum w^2 v_j^2 - 2 c sum (w^2 v_k v_j + w r v_j) + constant, whose
-    least is known in closed form. Factors of one cost no product and are offered beside the best ones;
-    nodes that the parameters are not part of may be numbers.
+    Let w be the weighted derivatives of the rows with respect to node k, v the values and r the residual. The cost of c
+    v_j in place of v_k is c^2 sum w^2 v_j^2 - 2 c sum (w^2 v_k v_j + w r v_j) + constant, whose minimum is known in
+    closed form. Factors of one save a product and are offered beside the best factors; nodes that do not depend on
+    parameters may be replaced by numbers.
 
     Args:
         values: Values of the nodes, (n_nodes, n_samples).

@@ -75,9 +75,6 @@ class Tape:
         """Return all terms as pairs of node and part, (n_candidates, 2).
 
         The last ones restore replaced nodes and cannot be removed.
-
-        All but the last ones can be left out. These are nodes as what they are, which can be put back
-        where they stand for others.
         """
         sums = np.flatnonzero(self._instructions.codes == SUM)
         whole = np.flatnonzero(self._instructions.codes != CONSTANT)
@@ -203,8 +200,8 @@ class Tape:
     ) -> FloatArray:
         """Return what terms add to quantities, to first order, (n_candidates, n_quantities * n_samples).
 
-        Terms that are left out get what they would give, nodes that stand for others what they would
-        give beyond that as what they are.
+        For removed terms this is the effect of restoring them; for replaced nodes, that of their own values instead of
+        the substitutes.
         """
         return kernels.compute_effects(
             self._instructions, pruning, candidates, values, kept_values, adjoints
@@ -213,8 +210,6 @@ class Tape:
     def find_combinations(self, pruning: Pruning, terms: IntArray, n: int) -> FloatArray:
         """Return the linear combinations of the first n inputs that terms are multiples of, (n_terms, n); zero for
         terms of another form.
-
-        Zero for terms that are no multiple of one, or for which that cannot be seen.
         """
         found, coefficients = kernels.find_combinations(self._instructions, pruning, n)
         nodes, what = terms.T
@@ -230,7 +225,7 @@ class Tape:
     def count_flipped(self, pruning: Pruning, candidates: IntArray) -> IntArray:
         """Return the number of operations after flipping each candidate, (n_candidates,).
 
-        Nodes that stand for themselves and could only stand for others stay as they are.
+        Candidates that restore a node which is not replaced change nothing.
         """
         return kernels.count_flipped(
             self._instructions, pruning,

@@ -35,8 +35,8 @@ def compare(
 ) -> int:
     """Compare two summaries or results folders; exit code 1 if they differ too much.
 
-    Prints the verdict, the selected models and the worst difference of each quantity; --verbose prints all. Orders are
-    compared up to ties, trajectories by the best and the median condition number.
+    The command prints the verdict, the selected models and the worst difference of each quantity; --verbose prints all
+    differences. Orders are compared up to ties, trajectories by the best and the median condition number.
     """
     summaries = [load_summary(path) for path in (first, second)]
     for path, summary in zip((first, second), summaries, strict=True):

@@ -38,9 +38,9 @@ WRONG = 1
 def doctor(as_json: bool) -> int:
     """Check this machine: compiler, caches, linear algebra, threads, extras.
 
-    Compiles the loops of all searches, so that no later run waits for that.
+    The loops of all searches are compiled, so that no later run waits for that.
 
-    Exit code 1 if something is missing that everything needs.
+    The exit code is 1 if something is missing that every run needs.
     """
     findings = []
     for what, state, found in _check_machine():

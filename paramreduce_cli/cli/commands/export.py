@@ -189,9 +189,6 @@ def _find_standard(loading: dict[type, Any], text: str | None, chosen: ReducedMo
 
     For base parameters they are the closest to the robot's own among all that give the same torques; those of
     consistent models are taken as they are.
-
-    A model is torques for base parameters, which many standard ones share: those closest to the
-    robot's own, but for consistent ones, which are what they are.
     """
     if text == CONSISTENT:
         consistent: FloatArray = loading[Identification].consistency.standard

@@ -60,10 +60,10 @@ def export_trajectory(
     moving: bool,
     output: Path | None,
 ) -> None:
-    """Write an exciting trajectory as a controller runs it.
+    """Write an exciting trajectory in a form that a controller can run.
 
-    With trajectories.start_pose in the config it begins and ends there, on ways that keep to half of the
-    limits of speed and acceleration and to those of torque and distance.
+    With trajectories.start_pose in the config, the motion begins and ends at that pose. The moves to the trajectory and
+    back keep half of the limits of speed and acceleration, and the limits of torque and distance.
     """
     loaded = load_config(config, overrides)
     store = Store(results or Path("results") / loaded.robot)

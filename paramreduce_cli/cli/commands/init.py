@@ -91,8 +91,8 @@ def init(
 ) -> None:  # fmt: skip
     """Write a commented config: from a URDF or MJCF, or with --dh, --tree, --loop or --recorded one to be filled in.
 
-    Of a file links that cannot move against each other become one body, rounded angles are taken
-    for what they were, limits and inertias are taken over. The config is the robot from then on.
+    Links of a file that cannot move relative to each other become one body. Angles such as 1.5708 become pi/2. Limits
+    and inertias are taken from the file. From then on the config describes the robot.
     """
     if source is None:
         raise ConfigError(

@@ -48,8 +48,8 @@ if TYPE_CHECKING:
 def inspect(file: Path, chosen: str | None, relations: bool, as_json: bool) -> None:
     """Show the results in an artifact, or the selected model of a results folder.
 
-    FILE is an artifact such as validation.h5, a results folder, or a config. `inspect selected` finds the only results
-    here.
+    FILE is an artifact such as validation.h5, a results folder, or a config. `inspect selected` uses the results in
+    this folder if there is only one.
     """
     if str(file) == "selected" and not file.exists():
         file = _find_results()
@@ -230,10 +230,7 @@ def _load_selected(file: Path) -> tuple[str, ReducedModel]:
 
 
 def _load_neighbour(file: Path, record: type) -> Any:
-    """Load the record in a file beside the inspected one; return None, with a warning, if it cannot be read.
-
-    It only tells more, so one that cannot be read is said, and no more.
-    """
+    """Load the record in a file beside the inspected one; return None, with a warning, if it cannot be read."""
     from paramreduce_cli.artifacts.store import load_file  # these load all numerics
 
     if not file.exists():

@@ -17,7 +17,7 @@ from paramreduce_cli.cli.terminal import print_error, say
 def open(results: Path) -> None:  # the file's name is the command's
     """Open a report in the browser.
 
-    RESULTS is a results folder. Where there is no browser the address is printed.
+    RESULTS is a results folder. If there is no browser, the address is printed.
     """
     folder = results if results.name == "report" else results / "report"
     if not folder.is_dir():

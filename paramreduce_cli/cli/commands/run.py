@@ -65,10 +65,10 @@ def run(
 ) -> int:
     """Run all stages in order, skipping what is up to date.
 
-    Ends with a summary table and the path of the report. Exit code 1 where the selected
-    model is not accepted.
+    The command ends with a summary table and the path of the report. The exit code is 1 if the selected model is not
+    accepted.
 
-    With --json every event is a line: stages, progress, and the verdict at last.
+    With --json every event is printed as a line: stages, progress, and at the end the verdict.
     """
     quiet = quiet or as_json
     loaded = load_config(config, overrides)

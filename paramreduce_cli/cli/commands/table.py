@@ -46,9 +46,9 @@ def table(
 ) -> None:
     """Make one table of several robots or runs, as text, CSV, LaTeX and a page.
 
-    RESULTS are results folders or summaries. Shows the selected model of each robot beside its
-    full one; of several runs of a robot how they spread, and which parameters all of them select.
-    PREFIX-runs.csv has a row of numbers for every run.
+    RESULTS are results folders or summaries. The table shows the selected model of each robot beside the full one. For
+    several runs of a robot it shows how results vary, and which parameters all runs select. PREFIX-runs.csv has a row
+    of numbers for every run.
     """
     if (listed is not None) == bool(results):
         raise click.UsageError("Give RESULTS, or --sweep FILE.")

@@ -33,7 +33,7 @@ def _divide_by_largest(
 def _compute_largest(W: FloatArray, axis: int, norm: float) -> tuple[FloatArray, FloatArray]:
     """Return a smooth maximum of the magnitudes along an axis, and its derivative with respect to W.
 
-    The maximum is smooth: a norm whose exponent is a power of two, as such powers are cheap.
+    The maximum is a p-norm whose exponent is a power of two, which is quick to compute.
     """
     magnitude = np.abs(W)
     largest = magnitude.max(axis=axis, keepdims=True)

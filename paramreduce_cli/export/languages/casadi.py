@@ -30,7 +30,7 @@ _CALLS = {
 def casadi(model: ExportedModel) -> dict[str, bytes]:
     """Write one file a function, for casadi.Function.load in Python, MATLAB and C++, and a text about them.
 
-    The function ``parameters`` gives the values, where they are no constants of the code.
+    The function ``parameters`` returns the values, if they are not constants of the code.
     """
     functions = {f.name: _make_function(f) for f in (*model.functions, *model.closures)}
     if model.closures:

@@ -211,9 +211,6 @@ def _close_nearby(equations: _Equations, mechanism: Mechanism, loops: Loops) -> 
     If that fails, as from a guess with all links in one line, it is tried again from random configurations near the
     guess.
 
-    A guess of zeros may be a pose in which all links lie in one line, which no step leads away from; then
-    they are moved at random before, a little at first.
-
     Raises:
         NumericalError: The loops cannot be closed.
     """
@@ -247,12 +244,6 @@ def _close_as_given(
         mechanism: Mechanism whose dependent coordinates are moved.
         loops: Loops with the guess.
         nearest: Configuration with closed loops that was found with all coordinates free to move.
-
-    If the guess leaves these at zero and the loops do not close, the configuration nearest to the guess is used
-    instead, with a message.
-
-    Where the guess is zero for all of these, or leaves them out, and the loops do not close so, they are closed where
-    all coordinates came to that were free to move, which is said.
     """
     try:
         return _close(equations, mechanism, loops, mechanism.dependent)
@@ -321,8 +312,8 @@ def _find_nonzero_rows(jacobian: FloatArray) -> IntArray:
 def _choose_equations(mechanism: Mechanism, loops: Loops, jacobians: list[FloatArray]) -> list[int]:
     """Return the equations that imply all others; a warning names the dropped ones.
 
-    Welds of planar or spherical linkages, and rods between two ball joints, have more equations than
-    they take away freedom. They can be dropped if the same ones do wherever the loops are closed.
+    Welds of planar or spherical linkages, and rods between two ball joints, have more equations than they remove
+    degrees of freedom. The surplus equations may be dropped if they are the same ones wherever the loops are closed.
 
     Raises:
         NumericalError: The equations leave nothing that moves, or which of them are independent changes along the

@@ -141,8 +141,6 @@ class Coordinates:
     def _march(self, z: FloatArray, start: FloatArray | None) -> tuple[FloatArray, FloatArray]:
         """Follow a motion from sample to sample, because a direct path to distant samples could end in another assembly
         mode. A few samples are followed one after the other; those between start from the nearest of them.
-
-        Every few samples one after the other, those between from the one before.
         """
         leaders = np.arange(0, z.shape[0], _LEADERS)
         known = np.empty((leaders.size, self.mechanism.n_q))

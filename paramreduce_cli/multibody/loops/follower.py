@@ -12,8 +12,8 @@ from paramreduce_cli.records import FloatArray
 class Follower:
     """A follower of positions along a motion that changes a little from call to call.
 
-    Each call starts from the positions kept last, of as many samples, and stays on the side of
-    singular configurations that the assembly is on.
+    Each call starts from the positions of the previous call, if that had as many samples, and stays in the assembly
+    mode of the mechanism.
 
     Args:
         coordinates: Coordinates of the mechanism.

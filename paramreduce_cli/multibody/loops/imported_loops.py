@@ -12,7 +12,8 @@ _DIGITS = 6
 
 
 def close_loops(robot: SimplifiedRobot, mechanism: Mechanism, *, required: bool) -> SimplifiedRobot:
-    """Close the loops from the pose of the file, and choose independent coordinates, those that are named first.
+    """Close the loops from the pose of the file, and choose independent coordinates; coordinates that are named as
+    independent are preferred.
 
     Args:
         robot: A robot with loops.

@@ -28,8 +28,8 @@ _SOLVER = "qr"
 class Projection:
     """The kinematics of loops as expressions of its symbol ``q`` that can be compiled and differentiated.
 
-    ``R`` and ``b`` are symbols for what :attr:`tangent` and :meth:`drift` solve for:
-    scalar expressions cannot hold a linear solver, expressions of matrices can.
+    ``R`` and ``b`` are symbols, because scalar expressions cannot contain a linear solver; :attr:`tangent` and
+    :meth:`drift` compute them with expressions of matrices.
 
     Args:
         mechanism: Mechanism with as many independent equations as dependent coordinates.
@@ -72,8 +72,8 @@ class Projection:
     def tangent(self) -> ca.MX:
         """Derivative of the dependent coordinates by the independent ones, (n_d, n_dof).
 
-        One expression for all that is made of it: solvers are not found to be equal, and a second one would
-        be solved again, once more in every derivative.
+        The expression is shared by all that depends on it, because CasADi does not recognise equal solvers and would
+        solve again, also in every derivative.
         """
         return -self.solve(ca.densify(self._whole_jacobian[:, self._z]))
 
@@ -102,8 +102,8 @@ class Projection:
     def project_regressor(self, tree: ca.Function, dq: ca.MX, ddq: ca.MX) -> ca.MX:
         """Return the transposed regressor in the independent coordinates, KT R, (n_parameters, n_dof).
 
-        Where the tree's is of scalars, so is the product: most of KT is zero, which derivatives of a product of
-        matrices do not use.
+        If the tree's regressor consists of scalars, so does the product: most of KT is zero, which derivatives of
+        products of matrices do not exploit.
 
         Args:
             tree: The open tree's transposed regressor KT by q, dq and ddq, (n_parameters, n_q).
@@ -126,7 +126,7 @@ class Projection:
     def distance(self) -> ca.MX:
         """Distance to singularity n / (|Phi_q| |Phi_d^-1|) in Frobenius norms, n equations.
 
-        0 where the dependent coordinates are not determined, 1 at best; smooth.
+        The distance is 0 where the dependent coordinates are not determined, at most 1, and smooth.
         """
         n = len(self._d)
         inverse = self.solve(ca.MX(ca.DM.eye(n)))

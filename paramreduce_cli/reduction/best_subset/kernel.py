@@ -149,7 +149,7 @@ def _drop(tableau: FloatArray, counters: IntArray, j: int) -> None:
 def _sweep(tableau: FloatArray, start: int, row: int, j: int, column_errors: FloatArray) -> None:
     """Sweep column j out of the matrix and the vector of one form; its own entries are not used again.
 
-    The loop takes one row at a time, with a copy of row j, as only then the compiler vectorises it.
+    The loop handles one row at a time, with a copy of row j, because only then the compiler vectorises it.
     """
     n = column_errors.size
     for k in range(n):
@@ -203,8 +203,8 @@ def _refit(
 ) -> None:
     """Fit all included and free columns from the columns themselves.
 
-    Rarely the decomposition of a large matrix does not converge: then the bound of more columns stays, and the next
-    exclusion starts again.
+    If the decomposition of a large matrix does not converge, which is rare, the bound of more columns stays, and the
+    next exclusion starts again.
     """
     n, free, count = tableau.shape[1], counters[FREE], counters[INCLUDED]
     rows = np.empty((free + count, data.chi.size))
@@ -396,7 +396,7 @@ def _exclude_parallel(
 ) -> None:
     """Exclude the columns that are parallel, in what is left of them, to that of a group.
 
-    A subset with one of them explains no more than the same with the group, which is searched.
+    A subset with one of these columns explains no more than the same subset with the group, which the search covers.
     """
     own = _find_position(counters, data.first[group])
     for j in range(counters[FREE] - 1, -1, -1):
@@ -435,7 +435,7 @@ def _compute_threshold(best: float, factor: float, uncertainty: float) -> float:
 def _offer(s: State, data: Data, count: int, first: int, second: int) -> None:
     """Keep the included columns and two more if their squared error is the smallest.
 
-    It is calculated by orthogonalisation; -1 stands for no column.
+    The error is computed by orthogonalisation; -1 stands for no column.
     """
     subset = np.full(data.group.size, -1, np.int64)
     _copy_vector(s.included[:count], subset[:count])
@@ -465,8 +465,8 @@ def _reduce_node(
 ) -> bool:
     """Decide what needs no branching at a node; False where it can be left.
 
-    Groups that are explained already or have no place are excluded; those without which the
-    bound would pass the threshold are included.
+    Groups that are explained already, or are too large for the columns left, are excluded. Groups without which the
+    bound would exceed the threshold are included.
     """
     while True:
         threshold = _compute_threshold(s.best[0], data.factor, data.uncertainty)
@@ -627,7 +627,7 @@ def search(s: State, data: Data, log: IntArray, most: int) -> tuple[int, int]:
     """Repeat the decisions that another search has logged, go on for a limited number of nodes, and stop with the log
     of where it is.
 
-    It is one function, as whatever calls the others is compiled together with all of them.
+    All steps are one compiled function, because each compiled caller would compile the others again.
 
     Returns:
         DONE or PAUSED, and the number of nodes visited.

@@ -57,8 +57,9 @@ class PartedSearch:
     def deal(self, job: Part) -> int:
         """Keep some of the subtrees that the search is split into, for other jobs to take the others.
 
-        Those nearest to the root are split first, until there are many; what is done on the way is done
-        by every job, and easy searches as a whole. They are dealt like cards, those of the lowest bounds first.
+        The subtrees nearest to the root are split first, until there are many. Every job repeats the search up to the
+        subtrees, and easy searches as a whole. The subtrees are distributed round-robin, those of the lowest bounds
+        first.
 
         Returns:
             A digest of all subtrees: jobs with the same one have the same cards; 0 where there are none.

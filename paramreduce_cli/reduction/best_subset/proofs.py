@@ -134,7 +134,7 @@ class ProofSearch:
     def run(self) -> None:
         """Search until all is proven, or time or nodes run out, or the user has enough.
 
-        In rounds of growing effort, so that what is easily proven does not wait for the rest.
+        The search proceeds in rounds of growing effort, so that easy proofs do not wait for hard ones.
         """
         self._compile()
         stop = threading.Event()
@@ -214,7 +214,7 @@ class ProofSearch:
     def _count_threads(self, waiting: int) -> int:
         """Return the number of threads for one size, given the number of sizes that wait.
 
-        With a limit of nodes it is one, so that every machine stops at the same node.
+        With a limit on nodes the number is one, so that every machine stops at the same node.
         """
         effort = self._task.effort
         return 1 if effort.node_limit else max(1, effort.jobs // waiting)
@@ -326,8 +326,8 @@ class ProofSearch:
     def _share_with_neighbours(self) -> None:
         """Apply what holds for one size to its neighbours.
 
-        A subset may be used for all larger sizes, a bound for all smaller ones; and if nothing is left to explain there
-        is nothing to prove.
+        A subset holds for all larger sizes, and a bound for all smaller ones. If nothing is left to explain, there is
+        nothing to prove.
         """
         before: _Proof | None = None
         for _, proof in sorted(self._proofs.items()):

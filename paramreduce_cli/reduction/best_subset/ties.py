@@ -15,8 +15,8 @@ def find_ties(squared_errors: FloatArray, best: float) -> BoolArray:
 def find_first_tie(problem: GroupedProblem, subset: IntArray, squared_error: float) -> IntArray:
     """Return the first subset, in lexicographic order, of those with the same error that single swaps reach.
 
-    Subsets that span the same space are the bases of a matroid, whose first basis is reached from any other by swaps
-    that each make it come earlier.
+    Subsets that span the same space are the bases of a matroid. The first basis is reached from any other by swaps of
+    which each gives an earlier basis.
 
     Args:
         problem: Problem with the columns; groups of several columns are not swapped.

@@ -91,7 +91,7 @@ class OperationsObjective(Objective):
     def estimate_losses(self, kept: Subset) -> FloatArray:
         """Return the rise of the squared error per operation that a removal saves.
 
-        Removals that break the limit come after all others, in order of the error they leave.
+        Removals that exceed the limit come after all others, in order of the error they leave.
         """
         costs = self._torque.estimate_losses(kept)
         result = np.full(costs.size, np.inf)

@@ -130,8 +130,9 @@ class TorqueObjective(Objective):
     def _compute_improvements(self, kept: Subset) -> FloatArray | None:
         """Return the fall of the squared error for every swap, (n_kept, n_groups), or None if the subset is dependent.
 
-        With r and e what the subset leaves of another column and of chi, b the subset's coefficients in either and P =
-        (X'X)^-1: without column i these become r + b_i u and e + b_i u with |u|^2 = 1 / P_ii, orthogonal to r and e.
+        Let r and e be the residuals of another column and of chi after projection on the subset, b the coefficients of
+        either on the subset, and P = (X'X)^-1. Without column i these residuals become r + b_i u and e + b_i u with
+        |u|^2 = 1 / P_ii, where u is orthogonal to r and e.
         """
         columns = self.list_columns(kept)
         if columns.size > self._X.shape[0]:

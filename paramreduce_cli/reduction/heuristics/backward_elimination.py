@@ -7,9 +7,9 @@ from paramreduce_cli.reduction.task import FoundSubsets, SelectionTask, make_nes
 def backward_elimination(task: SelectionTask) -> FoundSubsets:
     """Remove, one by one, the parameter whose removal raises the criterion least.
 
-    As long as columns are dependent many removals are free. Which of them comes first decides
-    what can be reached later, so it is not left to chance: of the free ones the parameter goes
-    that causes the smallest torques in the fit of least norm. Ties remove the least preferred.
+    While columns are dependent, many removals cost nothing, and their order decides which subsets can be reached later.
+    The parameter with the smallest torques in the minimum-norm fit is then removed first; of equal ones the least
+    preferred.
     """
     left: Subset = tuple(range(len(task.objective.groups)))
     order: Subset = ()

@@ -8,8 +8,8 @@ from paramreduce_cli.reduction.task import FoundSubsets, SelectionTask, append_o
 def floating(task: SelectionTask) -> FoundSubsets:
     """Add the best parameter, then remove parameters as long as that gives the best subset of its size so far.
 
-    After every addition the parameter that costs least is taken out if the smaller subset is
-    better than the best one of its size so far, and again, until it is not.
+    After every addition the parameter whose removal costs least is removed if the smaller subset is better than the
+    best one of its size so far; this is repeated until it is not.
     """
     objective = task.objective
     best: dict[int, tuple[float, Subset]] = {}

@@ -6,11 +6,10 @@ from paramreduce_cli.reduction.task import FoundSubsets, SelectionTask, append_o
 def forward_selection(task: SelectionTask) -> FoundSubsets:
     """Add, one by one, the parameter that lowers the criterion most.
 
-    By torques that is the one that lowers the error most: for a column of which r is left after
-    projecting out the subset, the squared error falls by (r . e)^2 / (r . r), e being what is left
-    of the torques; for a group it is what its columns explain together, per column. Once nothing
-    is left but round-off, the column of which the largest share is left comes next, so that the
-    order goes on to a well-conditioned base; dependent columns follow in order of preference.
+    For torques this is the parameter that lowers the error most. With r the residual of a column and e that of the
+    torques after projection on the subset, the squared error falls by (r . e)^2 / (r . r); a group counts with the fall
+    by all its columns, per column. If only round-off is left, the most independent column comes next, which leads to a
+    well-conditioned base; dependent columns follow in order of preference.
     """
     objective = task.objective
     order: tuple[int, ...] = ()

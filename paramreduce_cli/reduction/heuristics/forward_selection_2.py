@@ -7,8 +7,8 @@ from paramreduce_cli.reduction.task import FoundSubsets, SelectionTask, append_o
 def forward_selection_2(task: SelectionTask) -> FoundSubsets:
     """Add the best parameter, remove the one added in the pass before, and add the best again.
 
-    The first pass only adds. (As [Ros2019] prints Algorithm 3 it lacks the second addition, which
-    its text describes.) Subsets are not nested.
+    The first pass only adds. (Algorithm 3 as printed in [Ros2019] lacks the second addition that its text describes.)
+    Subsets are not nested.
     """
     objective = task.objective
     kept = objective.add_best((), task.limit)

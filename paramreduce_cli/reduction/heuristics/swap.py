@@ -20,10 +20,9 @@ _KICKED = 3
 def swap(task: SelectionTask) -> FoundSubsets:
     """Swap one parameter for another as long as that lowers the criterion, from many starts.
 
-    Starts are the subsets of forward selection, backward elimination and QR, those of the
-    neighbouring sizes with a parameter more or less, and random changes of the best subset. A
-    criterion that is costly to evaluate starts from what the swap search finds by torque, and
-    from its own forward selection.
+    Starts are the results of forward selection, backward elimination and QR, the best subsets of the neighbouring sizes
+    with a parameter more or less, and random changes of the best subset. A criterion that is costly to evaluate starts
+    from the results of the swap search by torque, and from its own forward selection.
     """
     search = _SwapSearch(task.objective, task.smallest, task.limit)
     cheap = task.objective.cheap

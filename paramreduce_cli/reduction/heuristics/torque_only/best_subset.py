@@ -9,9 +9,6 @@ def best_subset(task: SelectionTask) -> FoundSubsets:
 
     The swap search gives the starts. If time or nodes run out, or on Ctrl-C, the best subset found and a lower bound of
     the error are kept; a later run continues from there.
-
-    Starts from what the swap search finds. When time or nodes run out, or on Ctrl-C, the best
-    subset found and a lower bound of the error stand; a later run goes on from there.
     """
     search = ProofSearch(task, run("swap", task).subsets)
     search.run()

@@ -11,8 +11,8 @@ from paramreduce_cli.reduction.task import FoundSubsets, SelectionTask, append_o
 def essential(task: SelectionTask) -> FoundSubsets:
     """Remove, one by one, the parameter with the largest standard deviation relative to its value.
 
-    Starts from the preferred base set; the parameter with the largest relative standard deviation
-    goes, and the others are fitted again. A group is as sure as its surest member.
+    The search starts from the preferred base set. After each removal the other parameters are fitted again. A group has
+    the certainty of its most certain member.
     """
     objective = task.objective
     everything = tuple(range(len(objective.groups)))

@@ -12,9 +12,6 @@ def qr(task: SelectionTask) -> FoundSubsets:
 
     Each step takes the column with the largest residual, or the group with the largest per column. Only W matters, not
     the torques. Dependent columns follow in order of preference.
-
-    Each step takes the column of which most is left, or the group with the most per column; it
-    looks at W alone, not at the torques. Dependent columns follow in order of preference.
     """
     objective, problem = task.objective, task.objective.problem
     rest = Orthogonaliser(problem.X[:, problem.columns])
