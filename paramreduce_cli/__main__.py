@@ -10,7 +10,11 @@ import signal
 
 
 def main() -> None:
-    """Load the command line and run it."""
+    """Load the command line and run it.
+
+    Linear algebra gets one thread unless the user sets a number, figures go to files, and Ctrl-C ends the process also
+    while libraries load.
+    """
     os.environ.setdefault("OMP_NUM_THREADS", "1")
     os.environ["MPLBACKEND"] = "agg"
     signal.signal(signal.SIGINT, lambda *_: os._exit(130))

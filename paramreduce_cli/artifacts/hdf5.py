@@ -380,7 +380,7 @@ class Reader:
 
 
 class StoredRows:
-    """A numeric dataset in a file, of which slices are read; it becomes an array where NumPy needs one.
+    """A numeric dataset in a file, of which forward slices are read. It becomes an array where NumPy needs one.
 
     Args:
         reader: Reader of the file.

@@ -127,7 +127,9 @@ def list_newer_artifacts(results: Path) -> list[str]:
 
 
 def _is_whole(summary: Mapping[str, Any]) -> bool:
-    """Return whether the digest matches; without provenance, whether no key looks like a damaged one."""
+    """Return whether the digest matches; without provenance, whether no entry holds a digest, as a provenance under a
+    damaged key would.
+    """
     if "provenance" not in summary:
         return not any(isinstance(entry, dict) and "digest" in entry for entry in summary.values())
     stamp = _get_stamp(summary)

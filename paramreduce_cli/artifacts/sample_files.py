@@ -161,7 +161,7 @@ class StoredSet:
         """Dynamics of the model with which the samples were computed.
 
         Raises:
-            ArtifactError: The file of the model is not in the same folder.
+            ArtifactError: The file of the model is missing, or holds another model.
         """
         path = self._path.with_name(_MODEL)
         if self._path.parent.suffix == ITEMS:
@@ -331,7 +331,7 @@ def _read_optional(reader: Reader, name: str, size: int) -> FloatArray | None:
     """Return a vector of finite numbers, or None if the file has none.
 
     Raises:
-        ArtifactError: The vector has another length, or numbers that are not finite.
+        ArtifactError: The vector has another length, or numbers that are not finite; nominal torques may be infinite.
     """
     if name not in reader:
         return None

@@ -45,8 +45,8 @@ class ExampleCommand(click.Command):
         return f"paramreduce {self._example.format(**names | values)}"
 
     def show_example(self, words: Sequence[str]) -> str:
-        """Return the example with the config or results of this folder, or the command to run first; empty if the
-        folder has neither.
+        """Return the example with the config or results of this folder, and with the command to run first if one is
+        needed. Return an empty text if the folder has some of them, but not those that the example needs.
 
         Args:
             words: Words of the command line; the configs among them come first.

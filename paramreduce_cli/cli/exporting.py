@@ -13,7 +13,7 @@ def load_current(config: Config | None, store: Store, record: type) -> Any:
     """Return a record if its file is of the current config, as code for a controller must be.
 
     Raises:
-        ArtifactError: The file is missing, or was made with another config.
+        ArtifactError: The file is missing or damaged, or was made with another config or from other artifacts.
     """
     robot = config.robot if config is not None else None
     found = load_file(store.get_path(record), record, robot, find_maker(record).name)[0]

@@ -103,7 +103,9 @@ def make_stage_command(name: str) -> click.Command:
 
 
 def _format_help(stage: Stage) -> str:
-    """Return the help of a stage: its docstring without sections, and the files that the stage reads and writes."""
+    """Return the help of a stage: its docstring without the section on errors, and the files that the stage reads and
+    writes.
+    """
     reads = [get_file(entry.type) for entry in stage.artifacts]
     source = " and ".join([", ".join(reads[:-1]), reads[-1]] if len(reads) > 1 else reads)
     flow = f"Reads {source or 'the config'}; writes {get_file(stage.output)}."

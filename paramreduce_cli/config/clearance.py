@@ -92,7 +92,7 @@ class ClearanceSection(Section):
         """Return centres (k, 3) and radii (k,) of spheres that cover the capsules of each body.
 
         Raises:
-            ConfigError: A capsule is on a body that the robot lacks.
+            ConfigError: A capsule or an ignored pair names a body that the robot lacks.
         """
         numbers = {body.name: k for k, body in enumerate(mechanism.bodies)} | {BASE_NAME: BASE}
         named = [*self.capsules, *(name for pair in self.ignore for name in pair)]

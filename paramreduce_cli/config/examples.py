@@ -56,7 +56,7 @@ def copy_example(name: str, path: Path) -> tuple[list[Path], list[str]]:
         Copied files, the config first; and names of files that it refers to but that are not part of the package.
 
     Raises:
-        ConfigError: There is no such robot, or a file of the example exists already.
+        ConfigError: There is no such robot, a file with other contents exists already, or a file cannot be written.
     """
     known = list_examples()
     if name not in known:

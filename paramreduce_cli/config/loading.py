@@ -83,7 +83,8 @@ def load_settings(path: Path | None, overrides: Sequence[str] = ()) -> Settings:
         overrides: ``key.key=value`` texts that replace what the file says.
 
     Raises:
-        ConfigError: The overrides are wrong, as for :func:`load_config`.
+        ConfigError: The file cannot be read, or the file or the overrides have wrong keys or values, as for
+            :func:`load_config`.
     """
     document = yaml_reading.read_yaml("{}", "settings") if path is None else _read_document(path)
     try:
@@ -248,7 +249,9 @@ def _replace_item(value: str, place: Key, name: str) -> str:
 
 
 def _find_all_problems(data: dict[str, Any]) -> tuple[Config | None, list[Problem]]:
-    """Return the config, None if it has problems, and these: structural ones first, then those of the other parts."""
+    """Return the config, None if it has structural problems, and all problems: structural ones first, then those of the
+    other parts.
+    """
     constants, unreadable = read_constants(data.get("constants"))
     mistaken: list[Problem] = [(("constants", name), text) for name, text in unreadable.items()]
     try:

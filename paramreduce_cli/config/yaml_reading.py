@@ -37,7 +37,9 @@ class Document:
     """Keys set on the command line, with the text given there."""
 
     def describe_place(self, path: Key) -> str:
-        """Return file and line of a key, or of its nearest ancestor in the file."""
+        """Return file and line of a key, or of its nearest ancestor in the file; ``--set ...`` if the command line gave
+        the key.
+        """
         for end in range(len(path), -1, -1):
             if path[:end] in self.overrides:
                 return f"--set {self.overrides[path[:end]]}"

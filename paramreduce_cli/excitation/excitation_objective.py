@@ -43,7 +43,8 @@ class Bound:
     """The bound that a motion is nearest to, or exceeds by most."""
 
     excess: float
-    """Distance of the worst value beyond the bound, as a fraction of the bound's size; negative inside."""
+    """Distance of the worst value beyond the bound, without unit; negative inside. The scale depends on the kind of
+    bound."""
     name: str
 
 

@@ -29,8 +29,10 @@ def find_resting_position(
     margin: float = 1.0,
     preferred: FloatArray | None = None,
 ) -> FloatArray:
-    """Return independent coordinates inside all limits and bounds, (n_dof,): the middle of the limits, else the
-    assembly, else the result of a search.
+    """Return independent coordinates inside all limits and bounds, (n_dof,).
+
+    Try the preferred position or else the middle of the limits, a search from there, then the assembly of loops and a
+    search from there.
 
     Args:
         excitation: Excitation with the bounds.

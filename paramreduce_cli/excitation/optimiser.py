@@ -39,7 +39,7 @@ _ASTRAY = 0.25
 
 @dataclass(frozen=True)
 class Step:
-    """A step of a search: its level, and the fraction of the candidates that take part."""
+    """A step of a search: its level, and how many of the candidates take part."""
 
     level: Level
     fraction: float
@@ -310,8 +310,8 @@ class _Search:
         return end.iterations
 
     def _build_objective(self, grid: _Grid, level: Level) -> FreeObjective:
-        """Return what IPOPT minimises in a step of the plan: the condition number on a grid, smoothed as the step's
-        level says.
+        """Return what IPOPT minimises in a step of the plan: the criterion on a grid with its barrier, smoothed as the
+        step's level says.
         """
         positions = Follower(self._excitation.coordinates)
         return FreeObjective(

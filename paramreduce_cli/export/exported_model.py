@@ -112,8 +112,10 @@ def make_identifier(name: str) -> str:
 
 
 def make_harmless(text: str) -> str:
-    """Return text that cannot end a comment or a string in double quotes: double quotes become apostrophes, backslashes
-    become slashes, and */, /* and ??? are split by blanks.
+    """Return text that cannot end a comment or a string in double quotes.
+
+    Double quotes become apostrophes, backslashes slashes, unprintable characters blanks; */, /* and ??? are split by
+    blanks.
     """
     kept = "".join(c if c.isprintable() else " " for c in text)
     for bad, good in (("\\", "/"), ('"', "'"), ("*/", "* /"), ("/*", "/ *"), ("???", "? ? ?")):

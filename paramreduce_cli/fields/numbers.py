@@ -30,7 +30,7 @@ _SHOWN = 80
 
 
 def _abbreviate(value: Any) -> str:
-    """Return a value as text, cut after ``length`` characters."""
+    """Return a value as text, cut off if it is too long."""
     text = repr(value)
     return text if len(text) <= _SHOWN else f"{text[:_SHOWN]}..."
 
@@ -44,7 +44,7 @@ def parse_number(value: Any, constants: Mapping[str, float] | None = None) -> fl
         constants: Values of constants by name.
 
     Raises:
-        ValueError: The text is neither a number nor an expression.
+        ValueError: The value is neither a number nor an expression, or is NaN.
     """
     known = {**_CONSTANTS, **(constants or {})}
     example = "write one such as 0.5, 1e-3, pi/2 or 90deg"

@@ -38,12 +38,12 @@ class Rows:
     """The rows of W for the columns of one model, with the torques, held in memory.
 
     Attributes:
-        X: Weighted or plain columns, one array (n_samples, n_dof, p) for each uninterrupted part.
+        X: Columns of the model, one array (n_samples, n_dof, p) for each uninterrupted part.
         tau: Torques, one array (n_samples, n_dof) for each uninterrupted part.
         dz: Speeds, like tau.
         ddz: Accelerations, like tau.
         step: Step between samples, s.
-        share: Fraction of all samples that these are.
+        fraction: Fraction of all samples that these rows are.
     """
 
     X: tuple[FloatArray, ...]

@@ -45,6 +45,8 @@ def design_low_pass(cutoff: float, rate: float) -> FloatArray:
 def apply_filter(x: FloatArray, taps: FloatArray) -> FloatArray:
     """Return a filtered signal of the same length, or the signal itself for a filter of one coefficient.
 
+    The signal is extended at both ends by its point reflection, which keeps values and slopes.
+
     Args:
         x: Signals, (n_samples, n).
         taps: Coefficients of the filter, (2 k + 1,).

@@ -107,7 +107,7 @@ def collect_signals(
 
 
 def _decimate_processed(s: Signals, taps: FloatArray) -> list[FloatArray]:
-    """Return times, speeds, accelerations and low-passed torques of a motion, decimated.
+    """Return times, positions, speeds, accelerations and low-passed torques of a motion, decimated.
 
     States have been low-passed before.
 

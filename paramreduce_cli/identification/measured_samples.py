@@ -78,8 +78,8 @@ def _find_runs(motions: MeasuredMotions) -> tuple[IntArray, IntArray, IntArray]:
     return np.array([*starts, total]), np.array(pieces), np.array(folds)
 
 
-def _find_last_samples(edges: IntArray, outputs: range) -> list[int]:
-    """Return the last sample of every fold that has any among some samples."""
+def select_sample_of_each_fold(edges: IntArray, outputs: range) -> list[int]:
+    """Return a sample of every fold that has any among some samples."""
     later = [bisect_left(outputs, int(edge)) for edge in edges]
     return sorted({outputs[k] for k in (*later, len(outputs) - 1) if 0 <= k < len(outputs)})
 
@@ -106,7 +106,8 @@ class LoggedSet:
         every = round(self.log.rate / self.log.output_rate)
         self._stretches = list(_iterate_stretches(self.motions, self._taps.size // 2, every))
         ends = [
-            s.find_folds(np.array(_find_last_samples(s.edges, s.outputs))) for s in self._stretches
+            s.find_folds(np.array(select_sample_of_each_fold(s.edges, s.outputs)))
+            for s in self._stretches
         ]
         # Folds of which the low-pass leaves nothing are none.
         numbers = np.unique(np.concatenate([np.zeros(0, np.int64), *ends]))

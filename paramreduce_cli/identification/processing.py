@@ -229,8 +229,8 @@ def _cut_out_jumps(
         first_line: Line of the first row in its file, None where the file has no lines.
 
     Returns:
-        The recording without bad rows; rows after which positions stay changed, at which the recording is to be split;
-        sentences on what was done.
+        The recording without bad rows; rows with which a new motion begins because positions stay changed from there
+        on; sentences on what was done.
     """
     messages = []
     if any(recorded.turns):

@@ -105,7 +105,8 @@ def _convert_to_joints(signals: Signals, section: LogSection, n_dof: int) -> Sig
     """Convert signals of motors to signals of joints, in place, as there may be gigabytes.
 
     Raises:
-        ConfigError: The transmission matrix cannot be inverted or has another size.
+        ConfigError: The transmission matrix cannot be inverted or has another size, or there are not as many signs,
+            torque constants or offsets as joints.
     """
     sign = _expand_per_joint(section.apart.motion, "signs", n_dof)
     tau = signals.tau
@@ -160,7 +161,7 @@ def _read_matrix(
 
     Args:
         log: Log as read.
-        names: Names of the columns, or a pattern with ``{n}`` or ``{name}``.
+        names: Names of the columns, or a pattern with ``{}`` for the number or ``{name}`` for the name of the joint.
         joints: Names of the joints.
         key: Key of the quantity under sampling.log.columns, for messages.
         times: Name of the column of times, whose length the others must have.

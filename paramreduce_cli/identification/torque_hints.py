@@ -26,7 +26,8 @@ _NEAR = 0.1
 
 
 def hint_at_unit(expected: FloatArray, ratios: FloatArray) -> list[str]:
-    """Return a hint if measured torques are the config's torques times a large factor, as with a wrong unit.
+    """Return a hint if measured torques are the config's torques times a large, small or negative factor, as with a
+    wrong unit or sign.
 
     Args:
         expected: Torques of the bodies with the values in the config, (n_samples, n_dof).

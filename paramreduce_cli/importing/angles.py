@@ -52,9 +52,9 @@ def find_near_angle(text: str) -> float | None:
 
 
 def _find_nearest(text: str) -> tuple[int, float | None]:
-    """Return the number of decimals of a number, and the simple fraction of pi that it may have been rounded from.
+    """Return the number of decimals of a number, and the simple fraction of pi that is nearest to the number.
 
-    The fraction is None if the number is zero or has too few decimals.
+    The fraction is None if the nearest one is zero, or the number has too few decimals.
     """
     digits = -int(Decimal(text.strip()).as_tuple().exponent)
     parts = next((n for least, n in ((4, 12), (3, 4), (2, 2)) if digits >= least), None)

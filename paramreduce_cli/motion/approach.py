@@ -144,7 +144,6 @@ class PathPlanner:
 
         Raises:
             _NoPathError: Every duration exceeds a limit, or something is in the way.
-            _NoWayError: None does, or something is in the way.
         """
         limits = self._limits
         fast = np.maximum(_GENTLE * limits.velocity, np.abs([start[1], end[1]]).max(axis=0))
@@ -158,7 +157,7 @@ class PathPlanner:
                 name = self._find_violated_bound(z)
                 if name is not None:
                     raise _NoPathError(
-                        "the move from trajectories.start_pose to the trajectory violates the bounds of {name}; choose another pose."
+                        f"the move from trajectories.start_pose to the trajectory violates the bounds of {name}; choose another pose."
                     )
                 if self._is_loadable(z, dz, ddz):
                     return segment

@@ -109,7 +109,7 @@ def _list_curves(data: ReportData, library: _Models) -> list[dict[str, Any]]:
 
 
 def _list_errors(data: ReportData, result: HeuristicValidation) -> dict[str, Any]:
-    """Return the errors, the operations and the properties of the mass matrix of all models of a heuristic."""
+    """Return the errors and the operations of all models of a heuristic."""
     counted = data.model is not None
     return {
         "torque": {s: pack_array(_get_errors(result, "torque", s)) for s in SETS},

@@ -145,7 +145,7 @@ def _add_coordinate(offset: float, text: str, name: str) -> str:
 
 
 def _format_angle(angle: float) -> str:
-    """Return an angle as text: a simple multiple of pi if it is one, else four digits."""
+    """Return an angle as a multiple of pi, pi/2, pi/3, pi/4 or pi/6 if it is one, else with six significant digits."""
     for denominator in (1, 2, 3, 4, 6):
         multiple = angle * denominator / np.pi
         if abs(multiple - round(multiple)) < 1e-12:

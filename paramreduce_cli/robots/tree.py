@@ -252,7 +252,7 @@ class TreeDescription(BodiesDescription):
         return [body.name for body in self.bodies if not body.massless]
 
     def list_parents(self) -> list[str | None]:
-        """Return the name of each body's parent, as the user gave it; None for the base."""
+        """Return the name of each body's parent, as the user gave it; ``base`` for the base."""
         return [body.parent for body in self.bodies]
 
     def list_coordinates(self) -> list[str]:

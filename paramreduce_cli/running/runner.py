@@ -124,7 +124,7 @@ class Runner:
         callbacks: Functions that a run calls.
         samples: A samples.h5 brought by the user instead of the folder's own.
         settings: Settings, if there is no config.
-        asked: Config and options that name the run at the shell.
+        arguments: Config and options that name the run at the shell.
     """
 
     config: Config | None
@@ -304,7 +304,7 @@ class Runner:
 
     @property
     def config_name(self) -> str:
-        """Name of the config's file; empty if the run was not started from the shell."""
+        """Name of the config's file; empty if the run has no config, or was not started from the shell."""
         words = shlex.split(self.arguments) if self.config is not None else []
         return Path(words[0]).name if words else ""
 

@@ -93,7 +93,7 @@ class _LogFiles:
 
 
 def _load_logs(inputs: Inputs) -> RawLogs:
-    """Return the training and held-out logs that the config names."""
+    """Return the training and held-out logs that the config names; each file is read when it is iterated over."""
     files = inputs.note_files(RawLogs)
     training, held_out = (
         _LogFiles(

@@ -248,7 +248,7 @@ def _iterate_runs(path: Path, section: SweepSection, folder: Path) -> Iterator[S
 
 
 def _resolve_beside(path: Path, other: Path) -> Path:
-    """Return a path of the list relative to the working folder."""
+    """Return a path of the list, relative to the working folder if it is inside, otherwise absolute."""
     joined = other if other.is_absolute() else path.parent / other
     here = Path.cwd()
     resolved = joined.resolve()

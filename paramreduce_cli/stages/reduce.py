@@ -151,7 +151,7 @@ def _choose_weights(section: ReductionSection, samples: Samples) -> FloatArray:
     """Return the divisor of each joint's errors, (n_dof,).
 
     Raises:
-        DataError: A divisor is zero or no number.
+        DataError: A divisor is zero, no number, or too small or too large to calculate with.
     """
     weights = samples.nominal_torque
     if section.weighting == "none":
@@ -192,10 +192,9 @@ def _make_criterion_inputs(
     samples: Samples,
     columns: Columns,
 ) -> CriterionInputs:
-    """Return the inputs of criteria, computed when a criterion asks for them.
+    """Return the inputs of criteria, which are computed when a criterion asks for them.
 
-    Raises:
-        DataError: A criterion needs a model, or nominal accelerations, and there are none.
+    Asking raises DataError if a needed model or nominal accelerations are missing.
     """
 
     def modelled(criterion: str) -> Model:

@@ -159,8 +159,8 @@ class EvaluatedProgram:
 
     program: Simplified
     errors: tuple[Errors, Errors]
-    total_cost: float
-    """The largest as a share of the budget."""
+    worst_ratio: float
+    """Largest ratio of an error to its budget."""
 
     @classmethod
     def judge(cls, program: Simplified, judge: Evaluator, budget: Budget) -> "EvaluatedProgram":
@@ -171,7 +171,7 @@ class EvaluatedProgram:
     @property
     def rank(self) -> tuple[int, float]:
         """Operations, then the worst ratio to the budget; less is better."""
-        return self.program.program.n_operations, self.total_cost
+        return self.program.program.n_operations, self.worst_ratio
 
 
 def _iterate_within_budget(
@@ -187,9 +187,9 @@ def _iterate_within_budget(
     for _, alike in groupby(ends, lambda one: one.program.n_operations):
         judged = sorted(
             (EvaluatedProgram.judge(one, judge, budget) for one in alike),
-            key=lambda one: one.total_cost,
+            key=lambda one: one.worst_ratio,
         )
-        yield from (one for one in judged if one.total_cost <= 1)
+        yield from (one for one in judged if one.worst_ratio <= 1)
 
 
 def _choose_samples(
@@ -293,7 +293,7 @@ def _make_front(programs: list[EvaluatedProgram], judge: Evaluator) -> TermFront
     """Return the Pareto front of programs by operations and worst ratio to the budget."""
     kept: list[EvaluatedProgram] = []
     for one in sorted(programs, key=lambda one: one.rank):
-        if not kept or one.total_cost < kept[-1].total_cost:
+        if not kept or one.worst_ratio < kept[-1].worst_ratio:
             kept.append(one)
     errors = np.array([one.errors for one in kept])
     test = np.array([judge.compute_test_errors(one.program) for one in kept])

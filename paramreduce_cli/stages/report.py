@@ -207,8 +207,12 @@ def _export_code(
 
 
 def _compute_torque_rms(samples: Samples, nominal: FloatArray) -> dict[str, FloatArray]:
-    """Return the root mean squares of torques by set, (n_dof,), N m or N; at least a tiny number, as errors are divided
-    by them.
+    """Return the root mean square of each joint's torques in each set, (n_dof,); at least a tiny fraction of the
+    nominal torque, 0 where torques are not measured.
+
+    Args:
+        samples: Samples of the sets.
+        nominal: Nominal torques, (n_dof,), infinite where torques are not measured.
     """
     found = {}
     for name in SETS:

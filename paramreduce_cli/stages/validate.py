@@ -96,11 +96,11 @@ def validate(
     previous: Validation | None,
     run: Run,
 ) -> Validation:
-    """Compute errors and costs of the reduced models on all sets.
+    """Compute errors and costs of the reduced models on all sets, select a model and judge it.
 
     Without a model, on user-supplied samples, only torque errors are computed.
 
-    Errors of the same models on the same samples are taken from the previous run; only the judgement is repeated.
+    Errors of the same models on the same samples are taken from the previous run; selection and judgement are repeated.
 
     The exit code is 0 if the selected model is accepted, and 1 otherwise, with a sentence that says why.
     """

@@ -64,7 +64,7 @@ def test_programs_on_the_way_have_the_errors_and_operations_that_are_said(arm, b
         one = descent.rebuild(passed)
         assert one.program.n_operations <= count
         error, _ = looked_at.compute_errors(one.evaluate(looked_at.states))
-        assert error == pytest.approx(passed.excess * BUDGET.torque, rel=1e-6, abs=1e-12)
+        assert error == pytest.approx(passed.worst_ratio * BUDGET.torque, rel=1e-6, abs=1e-12)
         assert error <= BUDGET.torque
 
 
@@ -99,7 +99,7 @@ def test_once_more_it_begins_shortly_before_the_end_with_the_same_function(arm, 
     def again(turn):
         return Descent.restart(way, np.random.default_rng(turn), first.searching)
 
-    known = np.array([passed.excess for passed in way.visited.values()])
+    known = np.array([passed.worst_ratio for passed in way.visited.values()])
     sizes = set()
     for turn in range(6):
         one = again(turn)

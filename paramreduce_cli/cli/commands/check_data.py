@@ -34,7 +34,7 @@ _TABLE_WIDTH = 100
 def check_data(file: Path, config: Path | None, overrides: tuple[str, ...]) -> None:
     """Check whether a log is good enough: rate, gaps, noise, and with a CONFIG how well it excites the robot.
 
-    Columns are those of the config's log; without a config they are found by their usual names.
+    Columns are those of the config's log; without a log in a config they are found by their usual names.
     """
     # Late: these load all numerics.
     from paramreduce_cli.artifacts.log_files import load_log

@@ -108,6 +108,7 @@ def _load_summary(path: Path) -> dict[str, Any]:
     """Return the summary in a results folder or in a file.
 
     Raises:
+        ArtifactError: There is no report, or the file is missing, damaged or no summary.
         ConfigError: There is no report, or the file is no summary.
     """
     if path.is_dir() and not (path / SUMMARY).exists():

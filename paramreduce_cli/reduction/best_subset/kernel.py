@@ -627,7 +627,8 @@ def search(s: State, data: Data, log: IntArray, most: int) -> tuple[int, int]:
     """Repeat the decisions that another search has logged, go on for a limited number of nodes, and stop with the log
     of where it is.
 
-    All steps are one compiled function, because each compiled caller would compile the others again.
+    This is the only function that Python calls, because each further one would be compiled together with all steps
+    again.
 
     Returns:
         DONE or PAUSED, and the number of nodes visited.

@@ -21,7 +21,7 @@ inverses of X'X, whose round-off grows with its square."""
 RESOLUTION = 1e-9
 """Relative difference of squared errors that a proof does not resolve."""
 _UPDATES = 1e-14
-"""Round-off of the square root of a bound, for every group of the condition number."""
+"""Round-off of the square root of a bound, as a multiple of the condition number."""
 BEGINNING: IntArray = np.zeros(0, np.int64)
 """The log of a search that has not begun."""
 _SLACK = 1e-12
@@ -229,7 +229,7 @@ class Search:
         return min(searched, float(state.errors[level, self._kernel.BOUND]), *waiting)
 
     def _bound_exclusion(self, level: int) -> float:
-        """Return the bound of the branch of a level that has not been searched: the one without the level's column."""
+        """Return the bound of the branch of a level that has not been searched: the one without the level's group."""
         kernel, state = self._kernel, self._state
         tableau, counters = state.sheets[level], state.numbers[level]
         n, nullity = tableau.shape[1], int(counters[kernel.NULLITY])

@@ -19,7 +19,7 @@ def find_first_tie(problem: GroupedProblem, subset: IntArray, squared_error: flo
     which each gives an earlier basis.
 
     Args:
-        problem: Problem with the columns; groups of several columns are not swapped.
+        problem: Problem with the columns; if a group has several columns, nothing is swapped.
         subset: Numbered as its columns.
         squared_error: Squared error of the subset, a share of that of chi.
 

@@ -128,7 +128,7 @@ def _solve_least_squares(X: FloatArray, y: FloatArray) -> FloatArray:
 
 
 class AccelerationObjective(Objective):
-    """The exact acceleration error; its linearisation selects which swaps are evaluated."""
+    """The exact acceleration error; its linearisation selects which additions, removals and swaps are evaluated."""
 
     negligible = 1e-7
 

@@ -51,8 +51,8 @@ class TorqueObjective(Objective):
         return gains if self.single else self._add_group_gains(rest, gains)
 
     def _add_group_gains(self, rest: Orthogonaliser, gains: FloatArray) -> FloatArray:
-        """Write the gains of groups of several columns, per column: the fall of the squared error if all columns of the
-        group are added.
+        """Return the gain of each group per column, (n_groups,): the fall of the squared error if all columns of the
+        group are added. The gain of dependent groups is -inf.
         """
         result = np.full(self.widths.size, -np.inf)
         for group, width in enumerate(self.widths.tolist()):
