@@ -29,7 +29,8 @@ _MOST = 512 * 2**20
 def find_cache_folder() -> Path:
     """Return the folder of compiled models: ``$PARAMREDUCE_CACHE`` or the user's cache.
 
-    It is a temporary folder of this process if that folder cannot be made, or if other users could place code in it.
+    Return a temporary folder of this process instead if that folder cannot be made or written to, or if other users
+    could place code in it.
     """
     try:
         folder = _get_preferred_folder()

@@ -81,7 +81,8 @@ def _distribute(rows: Rows, n: int, place: int, joined: bool) -> None:
         rows: Rows of sums and products; changed in place.
         n: Number of the product's row.
         place: Position of the sum among the factors.
-        joined: Whether products inside the sum are multiplied out.
+        joined: Whether the factors of products inside the sum are copied into the new products, instead of references
+            to those products.
     """
     row, total = rows.room[0], rows.room[1]
     factor = rows.terms[n, place]

@@ -73,7 +73,7 @@ def make_rows(
     Args:
         sums: Terms of each sum, by number.
         products: Terms of each product, by number; none is negative.
-        pinned: Numbers of rows that outputs or functions refer to.
+        pinned: Numbers, with or without a row, that outputs or functions refer to.
         numbers: Number of slots in use.
         others: Operations that have no row.
     """
@@ -211,8 +211,8 @@ def put(rows: Rows, number: int, kind: int, row: IntArray) -> None:
     Args:
         rows: Rows of sums and products; changed in place.
         number: Number of the row.
-        kind: Operation of the new row: sum or product.
-        row: New terms; opposite terms of a sum cancel, and an empty sum becomes zero.
+        kind: Operation of the new row: sum or product; NONE to take the row away, which then enters no worklist.
+        row: New terms; changed in place. Opposite terms of a sum cancel, and an empty sum becomes zero.
     """
     if kind == SUM:
         length = _cancel(row)

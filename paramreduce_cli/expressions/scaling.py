@@ -27,7 +27,8 @@ _DIGITS = 6
 def rescale(program: Program, n: int) -> tuple[Program, FloatArray]:
     """Return the same function of inputs in other units, chosen so that few products with constants are left.
 
-    Constants that occur in many products are eliminated first, then others as far as the units are still free.
+    Products with constants that one choice of units removes together are removed first, the largest such set before
+    others; later sets only as far as the units are still free.
 
     Args:
         program: Program of sums, products and functions, numbers folded as a :class:`Graph` folds them.
@@ -107,7 +108,8 @@ class _Rescaler:
 
 
 class _Units:
-    """The units of all nodes, as factors, as far as equations between them fix these.
+    """The logarithms of the factors by which the values of nodes change, as far as equations between nodes fix these
+    factors.
 
     Args:
         program: Program whose nodes get units.

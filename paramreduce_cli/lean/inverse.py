@@ -133,8 +133,10 @@ def select_part(body: Inertia, choice: JointFormulation, place: InertiaPlace) ->
 
 
 def select_gauge(state: JointState, choice: JointFormulation, place: InertiaPlace) -> Gauge:
-    """Return which part of the inertia is handed to the parent body (its gauge) where the moments are computed at a
-    place.
+    """Return the gauge that the moments of inertia multiplied at a recursion step satisfy.
+
+    Return NONE if Izz and the moments across the axis are not all multiplied there, or if the rotation to that step has
+    undone the gauge.
 
     Args:
         place: Recursion step at which the moments are to be computed; steps other than the chosen one have no gauge.
@@ -154,11 +156,11 @@ def rotate_to_rest(wrench: Wrench, state: JointState) -> Wrench:
 
 
 def transfer_to_parent(wrench: Wrench, state: JointState) -> Wrench:
-    """Return a wrench in the parent body's frame, about that frame's origin; for joints whose axes are not those of the
-    parent.
+    """Return a wrench in the parent body's frame, about that frame's origin; for joints that are not aligned.
 
     Args:
-        wrench: Wrench in the joint's frame at rest, that of the body at q = 0, about its origin.
+        wrench: Wrench in the joint's frame at rest, against which the joint's angle is measured, about the joint's
+            origin.
         state: State of the joint.
     """
     turned = Wrench(

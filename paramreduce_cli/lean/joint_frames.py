@@ -104,8 +104,8 @@ def _has_tilt(rotation: FloatArray) -> bool:
 
 
 def _split_rotation_about_z(turn: FloatArray) -> tuple[FloatArray, float]:
-    """Split a rotation matrix into a rotation about z, applied first, and the rest; the angle is zero if the matrix is
-    a permutation of axes.
+    """Split a rotation matrix into the rest and the angle of a rotation about z that is applied first, and return both
+    in this order. The angle is zero if the matrix is a permutation of axes that moves the z axis.
 
     Permutations of axes cost no operations; for others, taking out the rotation about z saves products.
     """

@@ -100,7 +100,9 @@ class LeanFunctions:
     def _build_lean_outputs(
         self, model: Callable[..., Program], project: Callable[..., list[int]]
     ) -> tuple[Graph, list[int]]:
-        """Return the outputs of a lean model in a graph whose inputs are the kept parameters, then q, dq and ddq."""
+        """Return the outputs of a lean model in a graph whose inputs are the kept parameters, then q, dq and ddq, and
+        with loops R and b.
+        """
         if self._simplified is not None:
             program = self._build_pruned_program(self._simplified, project)
         else:

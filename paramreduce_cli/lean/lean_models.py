@@ -82,8 +82,8 @@ def _make_lean_models(same: _SameModel, independent: bool) -> LeanModels:
 class LeanModels:
     """Programs of the inverse and direct dynamics for any set of parameters.
 
-    Inputs are the standard parameters, then q, dq and ddq. For the independent coordinates of loops, the rows of R and
-    of b for the dependent coordinates follow, row by row.
+    Inputs are the standard parameters, then q, dq and ddq. With ``independent`` and loops, the rows of R for the
+    dependent coordinates follow one after the other, then the entries of b for these coordinates.
 
     Args:
         model: Model of the robot, with formulations to choose from.
@@ -229,8 +229,9 @@ class LeanModels:
         return {k: self._specialise_program(variants.programs[k], model, constant) for k in numbers}
 
     def _specialise_program(self, program: Program, model: ReducedModel, constant: bool) -> Values:
-        """Return the values of a program in which the parameters that a model drops are zero, and tied ones are one
-        input.
+        """Return the values of a program in which the parameters that a model drops are zero.
+
+        Tied parameters are one input, or with ``constant`` all kept ones are numbers.
         """
         ties, values = model.ties, model.standard
         kept = frozenset(model.kept.tolist())

@@ -69,11 +69,11 @@ def reject_if_wrong(
     Args:
         what: Source of the results, for the message.
         off: Differences from textbook recursion.
-        against: Magnitude that the largest difference is divided by.
+        against: Reference values; the largest difference is divided by the largest magnitude of these values.
         tolerance: Largest ratio that is allowed.
 
     Raises:
-        FormulationError: The ratio exceeds the tolerance.
+        FormulationError: The ratio exceeds the tolerance, or is not a number.
     """
     error = np.max(np.abs(off), initial=0.0) / np.max(np.abs(against), initial=1e-300)
     if not error <= tolerance:

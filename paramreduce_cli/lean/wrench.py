@@ -70,7 +70,8 @@ def compute_inertial_wrench(body: Inertia, frame: FrameMotion, a: Vector, gauge:
         body: Inertia in the frame, about its origin.
         frame: Motion of the frame.
         a: Acceleration of its origin, less gravity.
-        gauge: Part of the body's inertia that is handed to the parent body; with it the moment takes fewest operations.
+        gauge: Gauge that the inertia already has, as after :func:`split_off`; the moment then takes the fewest
+            operations.
     """
     force = add(frame.multiply(body.d), scale(body.m, a))
     return Wrench(force, add(_compute_spin_moment(body, frame, gauge), cross(body.d, a)))

@@ -132,8 +132,8 @@ class ObservedSet:
     def _follow(
         self, s: StateBlock, before: tuple[FloatArray, FloatArray]
     ) -> tuple[FloatArray, tuple[FloatArray, FloatArray]]:
-        """Return the generalised coordinates of a block, and the time and position at its end, at which the next block
-        starts.
+        """Return the generalised coordinates of a block, and the time and position of its last point, from which the
+        next block is followed. Without loops, return the time and position unchanged.
         """
         if self.dynamics.mechanism.loops is None:
             return s.z, before

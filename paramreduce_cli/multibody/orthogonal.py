@@ -40,8 +40,9 @@ class Orthogonaliser:
         return squared
 
     def take(self, column: int) -> bool:
-        """Remove the direction of a column from all columns; return whether the column was independent of those taken
-        before.
+        """Remove the direction of a column from all columns and from the vector, and set the column itself to zero.
+
+        Return whether the column was independent of those taken before; if not, nothing else is changed.
         """
         direction = self.X[:, column].copy()
         self.X[:, column] = 0.0

@@ -19,7 +19,8 @@ def draw_states(
     """Return random states: angles anywhere, slides as long as the mechanism, normally distributed speeds and
     accelerations.
 
-    States of loops are reached from the assembly by random moves that stay away from singular configurations.
+    States of loops are reached from the assembly by random moves, as far as the loops can be followed without coming
+    near a singular configuration; a state may stay at the assembly.
 
     Args:
         mechanism: Mechanism with assembled loops, if any.

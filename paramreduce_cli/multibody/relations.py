@@ -72,8 +72,9 @@ def name_coefficient(values: FloatArray, texts: Sequence[str], functions: FloatA
 def format_regrouping(
     names: Sequence[str], kept: IntArray, beta: Sequence[FloatArray], lengths: Sequence[Lengths]
 ) -> list[str]:
-    """Return the base parameters as sums of standard ones; coefficients are written as products of link lengths where
-    the geometry explains them, else as numbers.
+    """Return the base parameters as sums of standard ones.
+
+    Coefficients are written as functions of named lengths where the geometry explains them, else as numbers.
 
     Args:
         names: Names of all parameters, (n,).
@@ -96,7 +97,8 @@ def approximate_expressions(
 ) -> list[str]:
     """Return the approximate base parameters as sums of standard ones with numeric coefficients.
 
-    The terms with the largest share of the value come first; the text states only the number of the smallest ones.
+    Put the terms with the largest shares of the value first, and state only the number and the joint share of the
+    smallest ones. Without ``known_values``, print all terms in the order of the names.
 
     Args:
         names: Names of all parameters, (n,).
@@ -121,7 +123,8 @@ def approximate_expressions(
 
 
 def _format_sum(terms: Sequence[str], coefficients: FloatArray, first: str) -> str:
-    """Return a sum with its largest terms first; of the smallest terms only the number is given.
+    """Return a sum with its largest terms first; of the smallest terms only the number and the joint share in percent
+    are given.
 
     Args:
         terms: Terms with their signs.

@@ -95,7 +95,10 @@ class StatesInside:
         return np.asarray(inside & (self._quantities.compute_rows(q) <= 0).all(axis=1))
 
     def _walk(self, count: int, rng: np.random.Generator) -> FloatArray:
-        """Return random positions of loops, reached by moves from known positions, (count, n_q)."""
+        """Return random positions of loops, reached by moves from known positions, (n_found, n_q).
+
+        Positions outside limits or constraints are left out, so that there may be fewer than ``count``.
+        """
         lower, upper = self._lower[0, self._independent], self._upper[0, self._independent]
         q = self._known[rng.integers(len(self._known), size=count)]
         for _ in range(_MOVES):
@@ -111,12 +114,12 @@ class StatesInside:
     def _shorten(self, q: FloatArray, drawn: FloatArray) -> States:
         """Return q, dq and ddq of loops at positions q, each (n_samples, n_q).
 
-        Drawn velocities and accelerations are reduced where coordinates would exceed a limit, or where velocities alone
-        would cause too large accelerations.
+        Drawn velocities and accelerations are reduced where a velocity or an acceleration of any coordinate would
+        exceed a limit, or where velocities alone would cause more than half of the largest accelerations.
 
         Args:
             q: Positions, (n_samples, n_q).
-            drawn: Independent positions, velocities and accelerations, (n_samples, 3, n_dof).
+            drawn: Independent positions, which are not used, then velocities and accelerations, (n_samples, 3, n_dof).
         """
         rates, (_, dz, ddz) = self._coordinates.compute_rates, np.moveaxis(drawn, 1, 0)
         still = np.zeros_like(dz)
@@ -131,8 +134,8 @@ class StatesInside:
 
 
 def _compute_ratios(rates: FloatArray, lower: FloatArray, upper: FloatArray) -> FloatArray:
-    """Return the largest fraction, at most one, of all rates of a sample that is inside limits around zero, (n_samples,
-    1).
+    """Return the largest factor, at most one, by which all rates of a sample can be multiplied to lie inside limits
+    around zero, (n_samples, 1).
     """
     bound = np.where(rates > 0, upper, lower)
     shares = np.divide(bound, rates, out=np.ones_like(rates), where=rates != 0)

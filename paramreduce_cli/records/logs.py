@@ -50,7 +50,8 @@ class RawLogs:
 class MeasuredMotions:
     """A sequence of measured motions, evenly spaced in time within each piece.
 
-    Arrays of long motions stay in a file: slices can be read in order, and ``numpy.asarray`` reads the whole array.
+    Arrays of long motions stay in a file: they give slices with a positive step, and ``numpy.asarray`` reads the whole
+    array.
     """
 
     time: FloatArray

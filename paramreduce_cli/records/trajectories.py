@@ -65,7 +65,9 @@ class JointLimits:
 
 @record
 class Trajectory:
-    """One optimised finite Fourier series, with its figures and the course of the optimisation."""
+    """One finite Fourier series, optimised or given by the user, with its condition numbers, peaks and extremes, and
+    with the time, iterations and status of the optimisation.
+    """
 
     coefficients: FloatArray
     """[q0, a1, b1, a2, b2, ...] per joint, (n_dof, 1 + 2 harmonics)."""

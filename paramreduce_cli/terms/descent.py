@@ -212,8 +212,8 @@ class Descent:
             descent = rewritten
 
     def _rewrite(self) -> Descent:
-        """Return a descent from the leanest program so far, rewritten with fewer operations, or this descent if the
-        rewritten program exceeds the budget of errors.
+        """Return a descent from the leanest program so far after rewriting, or this descent if the rewritten program
+        exceeds the budget of errors.
         """
         passed = self.visited[min(self.visited)]
         simplified = self.history.rebuild(passed)

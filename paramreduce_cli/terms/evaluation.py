@@ -127,7 +127,9 @@ class Evaluator:
         return np.array([of_joints.min(axis=2), of_joints.max(axis=2)])
 
     def decimate(self, part: SampleSet, most: int) -> TermSamples:
-        """Return at most ``number`` samples of a set, evenly spread."""
+        """Return about ``most`` samples of a set, evenly spread within each trajectory; the number exceeds ``most`` by
+        less than one sample per trajectory.
+        """
         return self._make_samples(
             decimate_blocks(part.iterate_blocks(), -(-part.n_samples // most))
         )
@@ -258,7 +260,10 @@ class Evaluator:
         return StatesInside(self._model.mechanism, lower, upper, self._constraints, known)
 
     def _sample_states(self, count: int) -> Iterator[States]:
-        """Yield random states in portions; fewer than asked for if loops are hard to assemble."""
+        """Yield ``count`` random states in portions, for loops 1000 whatever ``count`` is.
+
+        Fewer are yielded if constraints exclude too many states or loops are hard to assemble.
+        """
         count = count if self._model.mechanism.loops is None else _OF_LOOPS
         for start in range(0, count, _AT_ONCE):
             some = self._inside.draw(min(_AT_ONCE, count - start), self._rng)

@@ -124,7 +124,9 @@ def evaluate(
 def evaluate_unreplaced(
     program: Instructions, pruning: Pruning, inputs: FloatArray, v: FloatArray
 ) -> FloatArray:
-    """Return the values that nodes would have if they were not replaced, (n_nodes, n_samples)."""
+    """Return the values that nodes would have if they were neither removed nor replaced, given the values of all nodes,
+    (n_nodes, n_samples).
+    """
     own = np.empty(v.shape)
     for k in range(program.codes.size):
         _evaluate_node(k, program, pruning, inputs, v, own[k])
@@ -222,14 +224,16 @@ def compute_effects(
     kept_values: FloatArray,
     adjoints: FloatArray,
 ) -> FloatArray:
-    """Return the value of each candidate times the derivatives of the quantities: to first order what they lose without
-    it, (n_candidates, n_quantities * n_samples).
+    """Return the value of each candidate times the derivatives of the quantities: to first order, what a present term
+    contributes and what a removed term or a restored node would add, (n_candidates, n_quantities * n_samples).
 
     Args:
         v: Values of all nodes at the samples, (n_nodes, n_samples).
-        kept_values: Values of all nodes as written, before they are replaced by others, (n_nodes, n_samples).
+        kept_values: Values that nodes would have if they were neither removed nor replaced, from
+            :func:`evaluate_unreplaced`, (n_nodes, n_samples).
         adjoints: Derivatives of the quantities by the nodes, (n_nodes, n_quantities, n_samples).
-        candidates: Node and what goes of it, the whole or an operand, (n_candidates, 2).
+        candidates: Node and part: an operand of a sum, the node as a whole, or ITSELF for the return of a replaced
+            node, (n_candidates, 2).
         program: The program.
         pruning: Pruning of the program, with the terms that are removed already.
     """
@@ -268,8 +272,8 @@ def find_combinations(
     """Return the linear combinations of the first n inputs that nodes are multiples of.
 
     Returns:
-        Index of the first node that is the same combination, NONE or SEVERAL, (n_nodes,); the coefficients, (n_nodes,
-        n).
+        Index of the node that holds the combination that each node is a multiple of, NONE or SEVERAL, (n_nodes,);
+        coefficients of the nodes that are themselves such combinations, zero for other nodes, (n_nodes, n).
     """
     codes, operands = program.codes, program.operands
     numbers = program.numbers

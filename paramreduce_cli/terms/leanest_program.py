@@ -159,7 +159,8 @@ def _descend_further(
         ends: Ends of the earlier descents.
         work: Work on an item.
         item: Function that makes an item from the earlier ends and its number.
-        patience: Number of descents in a row without improvement after which the search ends.
+        patience: Number of descents in a row that save less than half a percent of the operations, after which no more
+            of these descents are made.
         meter: Progress meter.
     """
     first = since = 0

@@ -69,8 +69,8 @@ def compute_whitening(gram: FloatArray, ridge: float) -> FloatArray:
 
     Args:
         gram: Gram matrix, (n, n).
-        ridge: Fraction of each column's square that is added to it; columns that depend on others to this fraction
-            count as zero.
+        ridge: Fraction of each column's square that is added to it. What earlier columns leave of a column is damped if
+            its square is below this fraction.
     """
     n = gram.shape[0]
     size = np.empty(n)

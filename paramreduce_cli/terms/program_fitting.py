@@ -54,7 +54,7 @@ class Costs:
 
 @dataclass(frozen=True)
 class Linear:
-    """A linear least-squares problem and its solution, from which effects of changes are estimated."""
+    """A linear least-squares problem, with the residual of its solution, from which effects of changes are estimated."""
 
     rows: FloatArray
     """Transposed, (n_parameters, n_rows)."""
@@ -75,7 +75,7 @@ class Linear:
         """Return the costs of changes of rows, before and after fitting the parameters again.
 
         Args:
-            changes: Change of the rows by each removal, (k, n_rows).
+            changes: What the rows lose by each removal or substitution, present minus new values, (k, n_rows).
             beta: Fitted parameters, (n_parameters,).
             combinations: Combinations of parameters that the removed terms are multiples of, (k, n_parameters); zero
                 for other terms.
@@ -173,7 +173,8 @@ class Fitting:
         Args:
             pruning: Pruning of the program.
             beta: Start values, from which mass matrices are computed that weigh accelerations.
-            checks: Number of times that the weights are updated.
+            checks: Number of fits. The weights come from the start values for the first fit, and from the fit before
+                for each further one.
         """
         samples = self.samples
         needed = self.tape.mark_live(pruning)
@@ -272,8 +273,8 @@ class Fitting:
         return substitutions.add_ones(constants[itself[constants]]), values, pulls
 
     def _differentiate(self, fit: TermFit) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return the values of nodes in the pruned program, their values without replacements, and the derivatives of
-        the torques with respect to the nodes.
+        """Return the values of nodes in the pruned program, the values that nodes would have if they were neither
+        removed nor replaced, and the derivatives of the torques with respect to the nodes.
         """
         inputs, everywhere = (
             self._stack_inputs(fit.beta, self.samples),
@@ -284,8 +285,9 @@ class Fitting:
         return values, self.tape.evaluate_unreplaced(fit.pruning, inputs, values), adjoints
 
     def _compute_metric(self, inverse: FloatArray | None) -> FloatArray | None:
-        """Return the matrices whose squares turn differences of torques into cost, (n_dof, n_dof, n_samples); None if
-        only torques matter, each with its own weight.
+        """Return upper triangular matrices R, (n_dof, n_dof, n_samples), such that the cost of a torque difference x is
+        x' R' R x. Return None if only torques are weighed, each by itself: if a mass matrix has no inverse, or
+        accelerations have no budget.
         """
         if inverse is None or np.isinf(self.budget.acceleration):
             return None

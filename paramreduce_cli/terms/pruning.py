@@ -40,7 +40,7 @@ class Pruning(NamedTuple):
 
     @classmethod
     def keep_all(cls, size: int) -> Pruning:
-        """Return the pruning of a program that keeps all its nodes."""
+        """Return the pruning that keeps all nodes of a program with ``size`` nodes."""
         return cls(np.ones((size, 3), dtype=np.bool_), np.arange(size), np.ones(size))
 
     def has(self, terms: IntArray) -> BoolArray:

@@ -42,7 +42,13 @@ class Substitutions:
         return int(self.nodes[which]), int(self.sources[which]), float(self.factors[which])
 
     def estimate_changes(self, values: FloatArray, pulls: FloatArray) -> FloatArray:
-        """Return the change of the rows by each substitution, to first order, (n_substitutions, n_rows)."""
+        """Return what the rows lose by each substitution, to first order, (n_substitutions, n_rows): present minus
+        substituted values, times the derivatives.
+
+        Args:
+            values: Values of all nodes, (n_nodes, n_samples).
+            pulls: Weighted derivatives of the rows with respect to all nodes, (n_nodes, n_dof, n_samples).
+        """
         stand_in = np.where(
             (self.sources == NUMBER)[:, None],
             self.factors[:, None],

@@ -200,8 +200,8 @@ class Tape:
     ) -> FloatArray:
         """Return what terms add to quantities, to first order, (n_candidates, n_quantities * n_samples).
 
-        For removed terms this is the effect of restoring them; for replaced nodes, that of their own values instead of
-        the substitutes.
+        For removed terms this is the effect of restoring them; for candidates that restore a replaced node, that of the
+        node's own value instead of the substitute.
         """
         return kernels.compute_effects(
             self._instructions, pruning, candidates, values, kept_values, adjoints

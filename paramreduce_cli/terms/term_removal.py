@@ -71,7 +71,8 @@ class TermSearch:
         noise: float = 0.0,
         until: int = 0,
     ) -> Step:
-        """Remove terms until every further removal would exceed the budget, or the program is lean enough.
+        """Remove terms and replace nodes until no promising change keeps errors within the budget, or at most ``until``
+        operations are left.
 
         Args:
             step: Step to start from.
@@ -147,13 +148,15 @@ class TermSearch:
     def _remove_several(
         self, step: Step, live: IntArray, costs: FloatArray, saved: FloatArray
     ) -> Step | None:
-        """Return the program without all terms that cost little, or None if these are few.
+        """Return the program without the terms that together cost little, or without the cheapest of them.
+
+        Return None if fewer than two of them can go within the budget.
 
         Args:
             step: Step to start from.
             live: Terms that may be removed, (n_terms, 2).
             costs: Cost of removing each term, (n_terms,).
-            saved: Number of operations that each removal saves, (n_terms,).
+            saved: Number of operations that each removal saves, divided by the noise weight of the term, (n_terms,).
         """
         fit = step.fit
         order = np.argsort(costs / saved, kind="stable")

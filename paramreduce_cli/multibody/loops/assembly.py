@@ -40,6 +40,9 @@ _ANOTHER_MODE = 1e-3
 def assemble(mechanism: Mechanism) -> Mechanism:
     """Return the mechanism with its loops closed, and with the independent coordinates at the values of the guess.
 
+    If these values are all zero and the loops do not close there, use the configuration found with all coordinates
+    free, with a warning.
+
     Raises:
         NumericalError: The loops cannot be closed from the guess, equations are redundant, or the
             independent coordinates are too many, too few or not independent.
@@ -208,8 +211,8 @@ def _close(
 def _close_nearby(equations: _Equations, mechanism: Mechanism, loops: Loops) -> FloatArray:
     """Move all coordinates from the guess until the loops are closed, and return the configuration.
 
-    If that fails, as from a guess with all links in one line, it is tried again from random configurations near the
-    guess.
+    If that fails from a guess of zeros, as with all links in one line, try again from random configurations. From any
+    other guess, raise the error at once.
 
     Raises:
         NumericalError: The loops cannot be closed.
@@ -244,6 +247,9 @@ def _close_as_given(
         mechanism: Mechanism whose dependent coordinates are moved.
         loops: Loops with the guess.
         nearest: Configuration with closed loops that was found with all coordinates free to move.
+
+    Raises:
+        NumericalError: The loops do not close, and an independent coordinate of the guess is not zero.
     """
     try:
         return _close(equations, mechanism, loops, mechanism.dependent)
@@ -396,7 +402,8 @@ def _check_regular(mechanism: Mechanism, jacobian: FloatArray) -> None:
 
 
 def _check_hinges(mechanism: Mechanism, loops: Loops, q: FloatArray) -> None:
-    """Raise NumericalError if the two axes of a hinge closure point in opposite directions, which its equations allow.
+    """Raise NumericalError if two axes that a closure keeps parallel point in opposite directions, which the equations
+    of the closure allow.
 
     Raises:
         NumericalError: Two axes are against each other.

@@ -140,7 +140,8 @@ class Coordinates:
 
     def _march(self, z: FloatArray, start: FloatArray | None) -> tuple[FloatArray, FloatArray]:
         """Follow a motion from sample to sample, because a direct path to distant samples could end in another assembly
-        mode. A few samples are followed one after the other; those between start from the nearest of them.
+        mode. Every fourth sample is followed from the previous such sample; the samples between start from the last
+        such sample before.
         """
         leaders = np.arange(0, z.shape[0], _LEADERS)
         known = np.empty((leaders.size, self.mechanism.n_q))
@@ -206,7 +207,8 @@ class Coordinates:
         return R
 
     def check_motion(self, time: FloatArray, q: FloatArray) -> None:
-        """Raise DataError if the dependent coordinates are not determined at every sample of a motion.
+        """Raise DataError if the loops do not determine the dependent coordinates at a sample of a motion, or between
+        two consecutive samples.
 
         Args:
             time: Time of consecutive samples, (n_samples,), s.

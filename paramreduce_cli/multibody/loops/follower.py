@@ -12,8 +12,8 @@ from paramreduce_cli.records import FloatArray
 class Follower:
     """A follower of positions along a motion that changes a little from call to call.
 
-    Each call starts from the positions of the previous call, if that had as many samples, and stays in the assembly
-    mode of the mechanism.
+    Each call starts from the positions that :meth:`keep` stored last, which must be of as many samples, or from the
+    assembly if none are stored. Positions stay on the side of singular configurations that the assembly is on.
 
     Args:
         coordinates: Coordinates of the mechanism.
@@ -37,8 +37,10 @@ class Follower:
         return self._last[1]
 
     def _find_positions(self, z: FloatArray) -> FloatArray:
-        """Return positions, found from those of the previous call, or from the assembly if these lead to another
-        assembly mode.
+        """Return positions, found from those that :meth:`keep` stored.
+
+        Start from the assembly if there are none, or if the loops cannot be closed from there or end beyond a singular
+        configuration.
         """
         if self._kept is not None:
             with contextlib.suppress(DataError):

@@ -28,8 +28,8 @@ _SOLVER = "qr"
 class Projection:
     """The kinematics of loops as expressions of its symbol ``q`` that can be compiled and differentiated.
 
-    ``R`` and ``b`` are symbols, because scalar expressions cannot contain a linear solver; :attr:`tangent` and
-    :meth:`drift` compute them with expressions of matrices.
+    ``R`` and ``b`` are symbols, because scalar expressions cannot contain a linear solver; :attr:`whole_tangent` and
+    :meth:`express_whole_drift` compute their values with expressions of matrices.
 
     Args:
         mechanism: Mechanism with as many independent equations as dependent coordinates.
