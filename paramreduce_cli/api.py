@@ -292,6 +292,7 @@ def inverse_dynamics(
     regressor, standard = Dynamics(model.mechanism).compute_regressor, parameters.standard
 
     def torques(q: FloatArray, dq: FloatArray, ddq: FloatArray) -> FloatArray:
+        """Return the torques of states, (n_samples, n_dof)."""
         arrays = [np.ascontiguousarray(x, dtype=float) for x in (q, dq, ddq)]
         _check_states(model, arrays)
         found: FloatArray = regressor(*arrays) @ standard

@@ -45,7 +45,7 @@ REGISTERED = (
 
 
 def functions():
-    """Yield file, qualified name and node of every function that is not inside another one."""
+    """Yield file, qualified name and node of every function, also of those inside another one."""
     for path, tree in TREES.items():
         stack = [("", node) for node in tree.body]
         while stack:
@@ -54,6 +54,11 @@ def functions():
                 stack += [(f"{prefix}{node.name}.", child) for child in node.body]
             elif isinstance(node, ast.FunctionDef):
                 yield path, prefix + node.name, node
+                stack += [
+                    (f"{prefix}{node.name}.", child)
+                    for child in ast.walk(node)
+                    if child is not node
+                ]
 
 
 def decorators(node):

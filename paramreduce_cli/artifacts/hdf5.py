@@ -173,7 +173,8 @@ class Writer:
         enough = max(1, _WRITTEN_AT_ONCE // max(1, columns or 1))
         count = 0
 
-        def flush() -> None:
+        def write_waiting() -> None:
+            """Write the waiting blocks to the dataset."""
             nonlocal count
             if waiting:
                 start = data.shape[0]
@@ -185,16 +186,18 @@ class Writer:
                 count = 0
 
         def finish() -> None:
-            flush()
+            """Write the waiting blocks, then the checksums of the dataset."""
+            write_waiting()
             checks.write(data)
 
         def append(block: np.ndarray) -> None:
+            """Add a block to the waiting ones, and write them if they are many."""
             self._update_digest(name, np.ascontiguousarray(block).tobytes())
             nonlocal count
             waiting.append(np.array(block, dtype=float))
             count += len(block)
             if count >= enough:
-                flush()
+                write_waiting()
 
         self._ends.append(finish)
         return append

@@ -290,12 +290,13 @@ def load_samples(reader: Reader) -> Samples:
     else:
         names = tuple(f"p{k + 1}" for k in range(n))
 
-    def stored(name: str) -> SampleSet | None:
+    def open_set(name: str) -> SampleSet | None:
+        """Return a stored set, or None if the file lacks it."""
         if f"{name}/W" in reader or f"{name}/{_LEFT_OUT}" in reader:
             return StoredSet(reader.path, name, n, owns_file=own)
         return None
 
-    estimation = stored("estimation")
+    estimation = open_set("estimation")
     assert estimation is not None
     nominal = {
         key: _read_optional(reader, key, reader.open_rows("estimation/tau").shape[1])
@@ -310,8 +311,8 @@ def load_samples(reader: Reader) -> Samples:
         nominal_torque=nominal.get("nominal_torque"),
         nominal_acceleration=nominal.get("nominal_acceleration"),
         estimation=estimation,
-        validation=stored("validation"),
-        test=stored("test"),
+        validation=open_set("validation"),
+        test=open_set("test"),
     )
 
 

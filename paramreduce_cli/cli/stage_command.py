@@ -53,6 +53,7 @@ def make_stage_command(name: str) -> click.Command:
         samples: Path | None = None,
         part: Part | None = None,
     ) -> int:
+        """Run the stage, and return the exit code."""
         if config is None and samples is None:
             raise MissingConfigError("Give a CONFIG, or --samples FILE and --results DIR.")
         robot = config is not None and (samples is None or has_robot(config))

@@ -229,6 +229,7 @@ def show_progress(
     with _choose_progress(label, quiet, as_json) as show:
 
         def step(p: Progress) -> None:
+            """Show a step of progress; raise an interruption that a library has swallowed."""
             show(p)
             interruption.check()
 
@@ -270,6 +271,7 @@ def _show_line(label: str) -> Iterator[Callable[[Progress], None]]:
         shown = ""
 
         def show(p: Progress) -> None:
+            """Update the line."""
             nonlocal shown
             total = p.total if p.done or p.total > 1 else None  # of a single step nothing is known
             if p.task != shown:

@@ -226,6 +226,7 @@ def _keep_likeliest(matches: Sequence[str], words: Sequence[str]) -> list[str]:
     """Keep the columns with the likeliest word; commanded values count if nothing was measured."""
 
     def rank(name: str) -> int:
+        """Return how unlikely a name is: measured before commanded, then by the order of the words."""
         tokens = {part.lower() for part in re.split(r"[/._]", name)}
         whole = {part.lower().strip("_") for part in _split_name(name)} | tokens
         first = min((k for k, word in enumerate(words) if word in whole), default=len(words))

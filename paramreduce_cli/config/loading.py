@@ -404,12 +404,13 @@ def _drop_unused_tests(config: Config) -> Config:
 def _resolve_paths(config: Config, folder: Path) -> Config:
     """Return the config with file names resolved against the folder of the config."""
 
-    def resolved(section: Any, *names: str) -> Any:
+    def resolve(section: Any, *names: str) -> Any:
+        """Return a section with some of its paths resolved."""
         found = {name: getattr(section, name) for name in names}
         update = {name: folder / path for name, path in found.items() if path is not None}
         return section.model_copy(update=update)
 
-    sampling = resolved(config.sampling, "estimation_file", "validation_file", "test_file")
+    sampling = resolve(config.sampling, "estimation_file", "validation_file", "test_file")
     if sampling.log is not None:
         files: dict[str, list[Path]] = {"files": [folder / path for path in sampling.log.files]}
         if others := sampling.log.held_out_files:
@@ -418,8 +419,8 @@ def _resolve_paths(config: Config, folder: Path) -> Config:
         sampling = sampling.model_copy(update={"log": log})
     return config.model_copy(
         update={
-            "trajectories": resolved(config.trajectories, "file"),
+            "trajectories": resolve(config.trajectories, "file"),
             "sampling": sampling,
-            "source": None if config.source is None else resolved(config.source, "file"),
+            "source": None if config.source is None else resolve(config.source, "file"),
         }
     )

@@ -135,11 +135,12 @@ def shrink_inside_bounds(
     still = np.zeros_like(coefficients)
     still[:, 0] = rest
 
-    def drawn(fraction: float) -> FloatArray:
+    def shrink(fraction: float) -> FloatArray:
         return still + fraction * (coefficients - still)
 
-    def inside(fraction: float) -> bool:
-        z, dz, ddz = basis.evaluate(drawn(fraction))
+    def is_inside(fraction: float) -> bool:
+        """Return whether the series, shrunk to a fraction, keeps all bounds."""
+        z, dz, ddz = basis.evaluate(shrink(fraction))
         positions = Follower(excitation.coordinates)
         if excitation.find_worst_bound(z, positions).excess > 0:
             return False
@@ -150,15 +151,15 @@ def shrink_inside_bounds(
             return False
         return excitation.compute_load_ratio(q, dz, ddz) <= 1
 
-    if inside(1.0):
+    if is_inside(1.0):
         return coefficients
     low, high = 0.0, 1.0
     for _ in range(_HALVINGS):
         middle = (low + high) / 2
-        low, high = (middle, high) if inside(middle) else (low, middle)
+        low, high = (middle, high) if is_inside(middle) else (low, middle)
     if low == 0.0:
         raise NumericalError(
             "the grid is too coarse to keep the constraints between its points. Use more.",
             Cause.GRID,
         )
-    return drawn(low)
+    return shrink(low)

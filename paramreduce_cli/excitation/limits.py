@@ -103,7 +103,8 @@ class LimitMap:
             slope = (g / divisor) ** (_BALL_POWER - 1)
         room = 1 - span / divisor
 
-        def pull(bar: FloatArray) -> FloatArray:
+        def pull_back(bar: FloatArray) -> FloatArray:
+            """Return the derivative with respect to the free series, given that with respect to the coefficients."""
             centre_bar = bar[:, 0] * self._reach * self.margin
             room_bar = centre_bar * _squash(offset)
             # Harmonics, centre and room all divide by the same number.
@@ -119,7 +120,7 @@ class LimitMap:
             return result
 
         harmonics_in = harmonics / divisor[:, None]
-        return self._insert_offset(offset, harmonics_in, up / divisor, down / divisor), pull
+        return self._insert_offset(offset, harmonics_in, up / divisor, down / divisor), pull_back
 
     def compute_resting_offset(self, z: FloatArray) -> FloatArray:
         """Return the free offsets of joints that rest at ``z``, both (n_dof,)."""

@@ -55,7 +55,8 @@ def evaluate_along(motions: Sequence[PointToPoint], points: int, finer: int) -> 
         finer: Factor by which the grid on which loops are followed is finer; 1 without loops.
     """
 
-    def at(span: Span) -> StateBlock:
+    def evaluate_span(span: Span) -> StateBlock:
+        """Return the states of a span."""
         motion = motions[span.trajectory]
         times = sample_point_to_point_times(motion, points)[span.start : span.stop]
         step = motion.duration / (points - 1) / finer
@@ -66,7 +67,7 @@ def evaluate_along(motions: Sequence[PointToPoint], points: int, finer: int) -> 
             span.trajectory, times, *states, fine_positions=positions if finer > 1 else None
         )
 
-    return at
+    return evaluate_span
 
 
 def find_point_to_point(

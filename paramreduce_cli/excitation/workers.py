@@ -59,13 +59,14 @@ def build_excitation(task: ExcitationTask) -> Excitation:
     coordinates, true = Coordinates(mechanism), Dynamics(mechanism)
     observation = Dynamics(smooth).make_observation(columns)
 
-    def measured(q: FloatArray, dz: FloatArray, ddz: FloatArray) -> FloatArray:
+    def compute_columns(q: FloatArray, dz: FloatArray, ddz: FloatArray) -> FloatArray:
+        """Return the base columns of W with the exact sign of friction, (n_points * n_dof, r)."""
         K = true.compute_regressor(q, *coordinates.compute_rates(q, dz, ddz))
         return K[..., columns].reshape(-1, columns.size)
 
     return Excitation(
         observation=observation,
-        measured=observation.evaluate if smooth is mechanism else measured,
+        measured=observation.evaluate if smooth is mechanism else compute_columns,
         coordinates=coordinates,
         quantities=Quantities(mechanism, task.constraints),
         beta=task.base.beta,

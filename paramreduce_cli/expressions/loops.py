@@ -85,7 +85,8 @@ def compile_loop(*, within: bool = False, makes_arrays: bool = True) -> Callable
             time of small functions or more; all arrays must then belong to the caller.
     """
 
-    def made(function: Loop) -> Loop:
+    def compile_function(function: Loop) -> Loop:
+        """Return a function that is compiled at its first call."""
         dispatcher: Any = numba.njit(
             cache=True,
             nogil=True,
@@ -104,4 +105,4 @@ def compile_loop(*, within: bool = False, makes_arrays: bool = True) -> Callable
             )
         return dispatcher
 
-    return made
+    return compile_function

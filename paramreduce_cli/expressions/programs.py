@@ -98,14 +98,14 @@ class Program:
         reached = graph.find_reached(list(outputs))
         place = {node: 2 * k for k, node in enumerate(reached)}
 
-        def moved(values: Sequence[int]) -> tuple[int, ...]:
+        def renumber(values: Sequence[int]) -> tuple[int, ...]:
             return tuple(place[value >> 1] ^ (value & 1) for value in values)
 
         nodes = tuple(
-            Node(node.operation, moved(node.operands), node.number)
+            Node(node.operation, renumber(node.operands), node.number)
             for node in (graph.nodes[k] for k in reached)
         )
-        return cls(nodes, moved(outputs))
+        return cls(nodes, renumber(outputs))
 
     @classmethod
     def from_stored(cls, stored: StoredProgram) -> Program:
@@ -183,6 +183,7 @@ class Program:
         graph = Graph()
 
         def substitute(position: int) -> int:
+            """Return the input at the new position, or zero."""
             moved = place(position)
             return graph.input(moved) if moved >= 0 else ZERO
 

@@ -183,13 +183,13 @@ class LoggedSet:
     def _make_block(self, held: list[Block], first: int, outputs: IntArray, fold: int) -> Block:
         """Return the block of some output samples from the rows in memory."""
 
-        def joined(key: str) -> FloatArray:
+        def join(key: str) -> FloatArray:
             return np.concatenate([getattr(block, key) for block in held])
 
-        tau = joined("tau")
+        tau = join("tau")
         n_rows, n_dof = tau.shape
-        states = {key: joined(key)[outputs - first] for key in _STATES}
-        W = joined("W").reshape(n_rows, -1)
+        states = {key: join(key)[outputs - first] for key in _STATES}
+        W = join("W").reshape(n_rows, -1)
         if self._taps.size == 1:
             W, tau = W[outputs - first], tau[outputs - first]
         else:

@@ -300,7 +300,8 @@ def _choose_cutoffs(
     """
     band = filters.find_motion_band(spectra.frequency, spectra.velocity)
 
-    def chosen(given: Frequency, automatic: float, key: str) -> float:
+    def choose(given: Frequency, automatic: float, key: str) -> float:
+        """Return a cut-off frequency: infinite for none, the automatic one, or the given one."""
         if given == "none":
             return np.inf
         if given == "auto":
@@ -313,8 +314,8 @@ def _choose_cutoffs(
             )
         return float(given)
 
-    state = chosen(section.state_cutoff, band, "state_cutoff")
-    torque = chosen(section.torque_cutoff, band, "torque_cutoff")
+    state = choose(section.state_cutoff, band, "state_cutoff")
+    torque = choose(section.torque_cutoff, band, "torque_cutoff")
     steps.append(
         f"Speeds stand out of their noise up to {band:.3g} Hz. Positions and speeds: {_describe_low_pass(state)}; "
         f"torques and observation matrix: {_describe_low_pass(torque)}."

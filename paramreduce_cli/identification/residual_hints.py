@@ -204,13 +204,13 @@ def _make_missing_hint(
 ) -> Callable[[float, float], str]:
     """Return a function that words the hint at a missing term."""
 
-    def said(coefficient: float, fraction: float) -> str:
+    def word_hint(coefficient: float, fraction: float) -> str:
         return (
             f"Residuals of {name} follow {what} ({coefficient:.3g} {unit}, {100 * fraction:.0f} % of them): "
             f"{key} is {'of another form' if key in modelled else 'missing'}."
         )
 
-    return said
+    return word_hint
 
 
 def _make_smoothing_hint(name: str, speed: float) -> Callable[[float, float], str | None]:
@@ -218,19 +218,20 @@ def _make_smoothing_hint(name: str, speed: float) -> Callable[[float, float], st
     residuals.
     """
 
-    def said(coefficient: float, fraction: float) -> str:
+    def word_hint(coefficient: float, fraction: float) -> str:
         return (
             f"Residuals of {name} follow a smooth sign of its speed ({100 * fraction:.0f} % of them): friction that "
             f"goes over from one sign to the other; try drives.{name}.smoothing: {speed:.2g}."
         )
 
-    return said
+    return word_hint
 
 
 def _make_scale_hint(name: str) -> Callable[[float, float], str | None]:
     """Return a function that words the hint at a wrong scale of torques, or None for small errors."""
 
-    def said(coefficient: float, fraction: float) -> str | None:
+    def word_hint(coefficient: float, fraction: float) -> str | None:
+        """Return the hint, or None for a small error of scale."""
         if abs(coefficient) < _GAIN:
             return None
         return (
@@ -238,13 +239,14 @@ def _make_scale_hint(name: str) -> Callable[[float, float], str | None]:
             "wrong torque constant or gear ratio?"
         )
 
-    return said
+    return word_hint
 
 
 def _make_delay_hint(step: float, known_delay: float) -> Callable[[float, float], str | None]:
     """Return a function that words the hint at a delay of torques; it returns None for delays far below a time step."""
 
-    def said(coefficient: float, fraction: float) -> str | None:
+    def word_hint(coefficient: float, fraction: float) -> str | None:
+        """Return the hint, or None for a delay far below a time step."""
         if abs(coefficient) < _DELAY * step:
             return None
         later = "later" if coefficient < 0 else "earlier"
@@ -253,13 +255,14 @@ def _make_delay_hint(step: float, known_delay: float) -> Callable[[float, float]
             f"sampling.log.delay: {known_delay - coefficient:.3g}."
         )
 
-    return said
+    return word_hint
 
 
 def _make_tilt_hint(axis: str, gravity: float) -> Callable[[float, float], str | None]:
     """Return a function that words the hint at a tilted base; it returns None for small angles."""
 
-    def said(coefficient: float, fraction: float) -> str | None:
+    def word_hint(coefficient: float, fraction: float) -> str | None:
+        """Return the hint, or None for a small angle."""
         angle = float(np.degrees(np.arctan2(abs(coefficient), gravity)))
         if angle < _TILT:
             return None
@@ -268,7 +271,7 @@ def _make_tilt_hint(axis: str, gravity: float) -> Callable[[float, float], str |
             "base level, and description.gravity right?"
         )
 
-    return said
+    return word_hint
 
 
 def hint_at_negative_friction(
@@ -310,14 +313,15 @@ def _find_mistaken_columns(fitted: LinearFit, names: Sequence[str]) -> Iterator[
         np.linalg.qr(np.column_stack([X[:, j], tau]), mode="r") / scale[j] for j in range(n_dof)
     ]
 
-    def left(owner: Sequence[int], signs: FloatArray) -> float:
+    def compute_misfit(owner: Sequence[int], signs: FloatArray) -> float:
+        """Return the misfit with the torques of other joints or with other signs."""
         A = np.concatenate([f[:, :p] for f in factors])
         y = np.concatenate([f[:, p + owner[j]] * signs[j] for j, f in enumerate(factors)])
         solution = solve_least_squares(np.column_stack([A, y]))
         return float(np.sum((y - A @ solution) ** 2))
 
     usual, plain = list(range(n_dof)), np.ones(n_dof)
-    before = left(usual, plain)
+    before = compute_misfit(usual, plain)
     found: list[tuple[float, str]] = []
     seen = np.flatnonzero(np.isfinite(scale)).tolist()
     for j in seen:
@@ -326,7 +330,7 @@ def _find_mistaken_columns(fitted: LinearFit, names: Sequence[str]) -> Iterator[
         signs[j] = -1
         found.append(
             (
-                left(usual, signs),
+                compute_misfit(usual, signs),
                 f"With the other sign of {name}'s torques the residuals are far smaller: is its sign "
                 "wrong? See sampling.log.signs.",
             )
@@ -336,7 +340,7 @@ def _find_mistaken_columns(fitted: LinearFit, names: Sequence[str]) -> Iterator[
         owner[i], owner[j] = j, i
         found.append(
             (
-                left(owner, plain),
+                compute_misfit(owner, plain),
                 f"With the torques of {names[i]} and {names[j]} exchanged the residuals are far smaller: "
                 "are their columns swapped?",
             )

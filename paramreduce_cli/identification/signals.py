@@ -81,7 +81,8 @@ def read_signals(
     columns, units = section.columns, section.units
     time = _read_column(log, columns.time) * TIMES[units.time]
 
-    def matrix(key: str, factor: float) -> FloatArray | None:
+    def read_quantity(key: str, factor: float) -> FloatArray | None:
+        """Return the columns of a quantity in SI units, or None if the log lacks them."""
         where = getattr(columns, key)
         if where is None:
             return None
@@ -91,9 +92,9 @@ def read_signals(
         return values
 
     position, velocity = ANGLES[units.position], SPEEDS[units.velocity]
-    z, dz = matrix("position", position), matrix("velocity", velocity)
-    ddz = matrix("acceleration", ACCELERATIONS[units.acceleration])
-    tau = matrix("torque", TORQUES[units.torque])
+    z, dz = read_quantity("position", position), read_quantity("velocity", velocity)
+    ddz = read_quantity("acceleration", ACCELERATIONS[units.acceleration])
+    tau = read_quantity("torque", TORQUES[units.torque])
     assert z is not None
     assert tau is not None
     _check_time(log, columns.time, time)
@@ -299,12 +300,13 @@ def _resample(signals: Signals, step: float) -> Signals:
     """Return signals at an even time step, by cubic splines."""
     time = signals.time[0] + step * np.arange(int((signals.time[-1] - signals.time[0]) / step) + 1)
 
-    def at(values: FloatArray) -> FloatArray:
+    def interpolate(values: FloatArray) -> FloatArray:
+        """Return columns at the even times, by cubic splines."""
         result = allocate_matrix(time.size, values.shape[1])
         for j, column in enumerate(values.T):
             result[:, j] = scipy.interpolate.CubicSpline(signals.time, column)(time)
         return result
 
-    dz = None if signals.dz is None else at(signals.dz)
-    ddz = None if signals.ddz is None else at(signals.ddz)
-    return Signals(time, at(signals.z), dz, ddz, at(signals.tau))
+    dz = None if signals.dz is None else interpolate(signals.dz)
+    ddz = None if signals.ddz is None else interpolate(signals.ddz)
+    return Signals(time, interpolate(signals.z), dz, ddz, interpolate(signals.tau))

@@ -124,7 +124,8 @@ def hint_at_gravity(
     """
     size = float(np.linalg.norm(gravity))
 
-    def left(assumed: FloatArray) -> float:
+    def compute_misfit(assumed: FloatArray) -> float:
+        """Return the misfit with another gravity."""
         added = np.tensordot(assumed - gravity, pulls, axes=1)
         return _compute_misfit(W + added, tau, deviation)
 
@@ -136,8 +137,8 @@ def hint_at_gravity(
         for sign in (1, -1)
         if np.linalg.norm(sign * size * axis - gravity) > _NEAR * size
     ]
-    least, where = min((left(assumed), where) for assumed, where in others)
-    without, usual = left(np.zeros(3)), left(gravity)
+    least, where = min((compute_misfit(assumed), where) for assumed, where in others)
+    without, usual = compute_misfit(np.zeros(3)), compute_misfit(gravity)
     if without < min(least, _LESS_WITHOUT * usual):
         return [
             "Without gravity the residuals are smaller: has the controller taken gravity out of the recorded torques "

@@ -236,9 +236,10 @@ def _format_limits(robot: SimplifiedRobot) -> str:
         else "nominal_torque: standard-deviation   # the file does not give all; or one per joint, N m (N)\n"
     )
 
-    def rows(
+    def format_rows(
         shown: Callable[[str, ImportedJoint | None], str], given: Callable[[ImportedJoint], object]
     ) -> str:
+        """Return a line for each coordinate, with a comment if the file lacks the limit."""
         width = max(len(shown(kind, limits)) for _, kind, limits in coordinates)
         return "".join(
             f"    - {shown(kind, limits):{width}}   # {name}"
@@ -247,8 +248,8 @@ def _format_limits(robot: SimplifiedRobot) -> str:
         )
 
     return (
-        f"{nominal}\n{_TRAJECTORIES}  position_limits:              # rad or m\n{rows(_format_position_limits, _is_limited)}"
-        f"  velocity_limits:              # rad/s or m/s\n{rows(_format_velocity_limit, _has_speed_limit)}"
+        f"{nominal}\n{_TRAJECTORIES}  position_limits:              # rad or m\n{format_rows(_format_position_limits, _is_limited)}"
+        f"  velocity_limits:              # rad/s or m/s\n{format_rows(_format_velocity_limit, _has_speed_limit)}"
         f"{_format_dependent_limits(robot)}"
     )
 

@@ -54,7 +54,8 @@ def write_mjcf(
     if any(c.get("inertiafromgeom") == "true" for c in root.findall("compiler")):
         raise ConfigError(f"{path}: makes inertias from geoms alone; take inertiafromgeom out.")
 
-    def element(tag: str, name: str) -> Any:
+    def find_element(tag: str, name: str) -> Any:
+        """Return the only element of a tag and a name in the world's bodies; raise ConfigError otherwise."""
         found = [
             e for part in root.findall("worldbody") for e in part.iter(tag) if e.get("name") == name
         ]
@@ -73,10 +74,10 @@ def write_mjcf(
                     f"{path}: MuJoCo takes physical bodies alone, and without the links that move with "
                     f"it {body.link} would have {own.mass:.3g} kg, or an inertia that no body has."
                 )
-            _write_inertia(mujoco, element("body", body.link), own)
+            _write_inertia(mujoco, find_element("body", body.link), own)
         if body.limits is not None:
             drive = drives.get(body.name, {})
-            joint = element("joint", body.limits.name)
+            joint = find_element("joint", body.limits.name)
             for name, key in _DRIVE.items():
                 joint.set(name, repr(drive.get(key, 0.0)))
             if "stiffness" in drive:

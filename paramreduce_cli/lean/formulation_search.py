@@ -129,6 +129,7 @@ def _improve_joint(
     """Return the choice at joint i from which no single change saves an operation."""
 
     def count(choice: JointFormulation) -> int:
+        """Return the number of operations with another choice at the joint."""
         some = [choice if k == i else choices[k] for k in piece.joints]
         return graph.count_operations(build(piece.tree, some, graph, piece.dropped))
 
@@ -190,7 +191,8 @@ def _renumber_columns(rigid: Rigid, positions: Mapping[int, int]) -> Rigid:
 def _make_signature(tree: Tree) -> tuple:
     """Return a key for the cache; trees with the same key need the same number of operations."""
 
-    def of(joint: Joint) -> tuple:
+    def describe_joint(joint: Joint) -> tuple:
+        """Return what operations at a joint depend on."""
         placed = (joint.place.tobytes(), joint.rotation.tobytes())
         if joint.parent == BASE:
             placed = ((joint.rotation.T @ tree.gravity).round(12).tobytes(), b"")
@@ -198,4 +200,4 @@ def _make_signature(tree: Tree) -> tuple:
         rigid = [(each.frame.tobytes(), tuple(each.columns.items())) for each in joint.rigid]
         return (*moving, placed, joint.described_to_axis.tobytes(), tuple(rigid))
 
-    return tuple(map(of, tree.joints))
+    return tuple(map(describe_joint, tree.joints))

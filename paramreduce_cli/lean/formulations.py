@@ -120,12 +120,13 @@ def find_formulations(
         found[one] = best
         run.progress(Progress("search for formulations", sum(map(len, found.values())), total))
 
-    def all_of(direct: bool) -> tuple[Formulation, ...]:
+    def collect_formulations(direct: bool) -> tuple[Formulation, ...]:
+        """Return the different formulations found for one function."""
         best = [choices for one in chains if one.direct == direct for choices in found[one]]
         same = [(start,) * len(tree.joints) for start in _starts(direct)]
         return tuple(tuple(map(to_data, choices)) for choices in dict.fromkeys(best + same))
 
-    return Formulations(all_of(False), all_of(True))
+    return Formulations(collect_formulations(False), collect_formulations(True))
 
 
 def _starts(direct: bool) -> tuple[JointFormulation, ...]:
@@ -194,6 +195,7 @@ def add_formulations(
         dropped = everything - frozenset(kept.tolist())
 
         def count(choices: _Choices, dropped: frozenset[int] = dropped) -> int:
+            """Return the number of operations of a formulation without the dropped parameters."""
             graph = Graph()
             return graph.count_operations(build(tree, choices, graph, dropped))
 

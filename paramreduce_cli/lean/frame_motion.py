@@ -133,14 +133,17 @@ def change_components(turn: ConstantRotation, frame: FrameMotion) -> FrameMotion
     axes = turn.find_permutation()
 
     def component(i: int, j: int) -> Scalar:
+        """Return an entry of U in the new components."""
         (k, a), (m, b) = axes[i], axes[j]
         return a * b * frame.U[k][m]
 
     def product(i: int, j: int) -> Scalar:
+        """Return a product of angular speeds in the new components."""
         (k, a), (m, b) = axes[i], axes[j]
         return a * b * frame.products[3 - k - m]
 
     def step(i: int, j: int) -> Scalar:
+        """Return a difference of squares of angular speeds in the new components."""
         k, m = axes[i][0], axes[j][0]
         value = frame.steps[3 - k - m]
         return value if (k + 1) % 3 == m else -value

@@ -116,19 +116,19 @@ def select_part(body: Inertia, choice: JointFormulation, place: InertiaPlace) ->
     """
     zero = body.m - body.m
 
-    def kept(where: InertiaPlace, value: Scalar) -> Scalar:
+    def keep(where: InertiaPlace, value: Scalar) -> Scalar:
         return value if where is place else zero
 
     radial, tilt, plane = choice.radial, choice.tilt, choice.plane
     return Inertia(
-        kept(choice.mass, body.m),
-        (kept(radial, body.d[0]), kept(radial, body.d[1]), kept(choice.axial, body.d[2])),
-        xx=kept(plane, body.xx),
-        xy=kept(plane, body.xy),
-        xz=kept(tilt, body.xz),
-        yy=kept(plane, body.yy),
-        yz=kept(tilt, body.yz),
-        zz=kept(choice.polar, body.zz),
+        keep(choice.mass, body.m),
+        (keep(radial, body.d[0]), keep(radial, body.d[1]), keep(choice.axial, body.d[2])),
+        xx=keep(plane, body.xx),
+        xy=keep(plane, body.xy),
+        xz=keep(tilt, body.xz),
+        yy=keep(plane, body.yy),
+        yz=keep(tilt, body.yz),
+        zz=keep(choice.polar, body.zz),
     )
 
 

@@ -85,6 +85,7 @@ class LeanFunctions:
         for value in range(n):
 
             def substitute(position: int, value: int = value) -> int:
+                """Return 1 for the parameters of this column, 0 for others; other inputs follow the kept parameters."""
                 if position >= start:
                     return graph.input(position - start + n)
                 return graph.constant(1.0) if place[position] == value else ZERO
@@ -111,6 +112,7 @@ class LeanFunctions:
         graph = Graph()
 
         def substitute(position: int) -> int:
+            """Return the input of a kept parameter by its position in the model, or another input behind these."""
             kept = position - start + n if position >= start else int(place[position])
             return graph.input(kept)
 
@@ -125,6 +127,7 @@ class LeanFunctions:
         graph = Graph()
 
         def substitute(position: int) -> int:
+            """Return the input of a lean model for an input of the pruned program."""
             if position >= n:
                 return graph.input(position - n + start)
             if self._constant:
@@ -168,7 +171,10 @@ class LeanFunctions:
         right = Argument("gamma", (n_d,), "what is left of its second derivative, negative")
         by_d, by_z = (ca.vec(ca.densify(jacobian[:, some]).T) for some in (d, z))
 
-        def new(name: str, text: str, inputs: list, outputs: list, *results: Argument) -> Function:
+        def make_function(
+            name: str, text: str, inputs: list, outputs: list, *results: Argument
+        ) -> Function:
+            """Return a function of the loops with its expressions rewritten."""
             function = ca.Function(name, inputs, [ca.densify(ca.vertcat(*outputs))])
             graph = Graph()
             graph, values = minimise_operations(
@@ -178,7 +184,13 @@ class LeanFunctions:
             return Function(name, text, states, results, Program.from_graph(graph, values))
 
         return [
-            new("closure", "The equations that close the loops.", [q], [equations, by_d], gap, J_d),
-            new("closure_jacobian", "Derivatives of the equations.", [q], [by_d, by_z], J_d, J_z),
-            new("closure_bias", "Right side of the acceleration problem.", [q, dq], [gamma], right),
+            make_function(
+                "closure", "The equations that close the loops.", [q], [equations, by_d], gap, J_d
+            ),
+            make_function(
+                "closure_jacobian", "Derivatives of the equations.", [q], [by_d, by_z], J_d, J_z
+            ),
+            make_function(
+                "closure_bias", "Right side of the acceleration problem.", [q, dq], [gamma], right
+            ),
         ]

@@ -238,6 +238,7 @@ class LeanModels:
         graph = Graph()
 
         def substitute(position: int) -> int:
+            """Return what takes the place of an input: zero, a number, or an input."""
             if position >= self.n_parameters:
                 return graph.input(position)
             if position not in kept:

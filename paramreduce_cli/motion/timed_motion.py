@@ -61,16 +61,17 @@ def sample_motion(
     harmonics = (trajectory.coefficients.shape[1] - 1) // 2
     turns = np.zeros(mechanism.n_dof)
 
-    def along(time: FloatArray) -> State:
+    def evaluate(time: FloatArray) -> State:
+        """Return the states of the trajectory, moved by whole revolutions."""
         z, dz, ddz = evaluate_basis(period, harmonics, time).evaluate(trajectory.coefficients)
         return z + 2 * np.pi * turns, dz, ddz
 
     if start_pose is None or planner is None:
         time = np.arange(int(np.floor(period * rate + 1e-9)) + 1) / rate
-        z, dz, ddz = along(time)
+        z, dz, ddz = evaluate(time)
         return TimedMotion(title, names, rate, time, z, dz, ddz, 0.0, period)
-    turns = _choose_revolutions(mechanism, trajectories, along, start_pose)
-    border = tuple(state[0] for state in along(np.zeros(1)))
+    turns = _choose_revolutions(mechanism, trajectories, evaluate, start_pose)
+    border = tuple(state[0] for state in evaluate(np.zeros(1)))
     approach, retreat = (
         planner.plan(make_rest_state(start_pose), border),
         planner.plan(border, make_rest_state(start_pose)),
@@ -78,7 +79,7 @@ def sample_motion(
     lead = sum(segment.duration for segment in approach)
     parts: list[tuple[float, Callable[[FloatArray], State]]] = [
         *((segment.duration, segment.compute_states) for segment in approach),
-        (period, along),
+        (period, evaluate),
         *((segment.duration, segment.compute_states) for segment in retreat),
     ]
     time, (z, dz, ddz) = _sample_parts(parts, rate)

@@ -85,11 +85,12 @@ def format_regrouping(
     found = [list_functions(entry) for entry in lengths]
     texts, functions = list(found[0]), np.array([list(entry.values()) for entry in found])
 
-    def term(row: int, column: int) -> str:
+    def format_term(row: int, column: int) -> str:
+        """Return a coefficient as text: a function of lengths, or a number."""
         values = np.array([b[row, column] for b in beta])
         return name_coefficient(values, texts, functions) or format_signed(values[0])
 
-    return _format_expressions(names, kept, beta[0], term)
+    return _format_expressions(names, kept, beta[0], format_term)
 
 
 def approximate_expressions(

@@ -100,6 +100,7 @@ def placed(
     """Declare where a figure or a table stands on the page, and whether it needs a mechanism, as its section may."""
 
     def declare(function: F) -> F:
+        """Set the place of a function, and return the function."""
         place = PagePlace(section, order, tall, of_mechanism or section.of_mechanism)
         function.place = place  # type: ignore[attr-defined]
         return function

@@ -128,13 +128,13 @@ def _summarise_columns(reduction: Reduction) -> dict[str, Any]:
 def _summarise_subsets(reduction: Reduction, subsets: Subsets) -> dict[str, Any]:
     """Return the subsets of a heuristic."""
 
-    def named(columns: IntArray) -> list[str]:
+    def list_names(columns: IntArray) -> list[str]:
         return [reduction.columns.names[k] for k in columns]
 
     nested = subsets.order is not None
     return {
-        "order": named(subsets.order) if subsets.order is not None else None,
-        "subsets": None if nested else [named(subset) for subset in subsets.subsets],
+        "order": list_names(subsets.order) if subsets.order is not None else None,
+        "subsets": None if nested else [list_names(subset) for subset in subsets.subsets],
         "n": subsets.n,
         "torque_error_1": subsets.torque_error_1,
         "torque_error_inf": subsets.torque_error_inf,
@@ -257,6 +257,7 @@ def _summarise_errors(of: TermModel | TermFront, row: int | None = None) -> dict
     """Return torque and acceleration errors on all sets."""
 
     def errors_on(part: str, what: str) -> Any:
+        """Return the errors on a set; for the test set their range."""
         value = getattr(of, f"{what}_error")[part]
         own = value if row is None else value[row]
         return _summarise_range(ErrorRange.summarise(own)) if part == "test" else own
@@ -308,6 +309,7 @@ def _summarise_rows(validation: HeuristicValidation) -> list[dict[str, Any]]:
     }
 
     def entry(part: str, key: str, values: Any) -> Any:
+        """Return one quantity of one model as data for JSON."""
         if part == "operations":
             return _convert_count(values)
         return _summarise_range(ErrorRange.summarise(values)) if key == "test" else values

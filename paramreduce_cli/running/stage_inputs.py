@@ -70,6 +70,7 @@ def note_warnings() -> Iterator[list[str]]:
         show = warnings.showwarning
 
         def note(message: Warning | str, category: type[Warning], *where: Any) -> None:
+            """Collect a warning of this project, and show it as usual."""
             if issubclass(category, ParamreduceWarning) and len(noted) < _MOST_WARNINGS:
                 noted.append(str(message))
             show(message, category, *where)

@@ -172,7 +172,8 @@ class Sweep:
         found: list[list[str]] = []
         waiting: dict[str, list[str]] = {name: [] for name in self.runs}
 
-        def close() -> None:
+        def close_phase() -> None:
+            """End a phase: chain the waiting commands of each run."""
             found.append([" && ".join(lines) for lines in waiting.values() if lines])
             for lines in waiting.values():
                 lines.clear()
@@ -185,12 +186,12 @@ class Sweep:
                 for part in self.list_parts(stage, run)
             ]
             if parts:
-                close()
+                close_phase()
                 found.append(parts)
             for name, run in having.items():
                 text = run.format_command(stage, jobs=jobs)
                 waiting[name].append(f"{{ {text}; }}" if "||" in text else text)
-        close()
+        close_phase()
         return [*(commands for commands in found if commands), [self.format_table_command()]]
 
 

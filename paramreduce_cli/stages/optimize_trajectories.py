@@ -170,7 +170,8 @@ def _evaluate_coefficients(
     """
     excitation = build_excitation(task)
 
-    def measure(entry: FloatArray) -> Trajectory:
+    def describe_series(entry: FloatArray) -> Trajectory:
+        """Return a user-supplied series as a trajectory with its figures."""
         harmonics = (entry.shape[1] - 1) // 2
         return describe(
             excitation,
@@ -190,7 +191,7 @@ def _evaluate_coefficients(
                 f"{coefficients.source}: the {name} coefficients are for {values.shape[1]} joints, but "
                 f"{model.mechanism.robot} has {n_dof}."
             )
-        sets[name] = tuple(measure(entry) for entry in values)
+        sets[name] = tuple(describe_series(entry) for entry in values)
         if not sets[name]:
             continue
         _check_motion(coefficients.source, name, sets[name], task.settings.limits)

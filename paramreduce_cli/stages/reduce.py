@@ -137,11 +137,12 @@ def _prove_part(task: SelectionTask, kept: KeptProofs, sizes: Sequence[int]) -> 
     """
     cut_short: list[bool] = []
 
-    def interrupted() -> None:
+    def note_interruption() -> None:
+        """Note the interruption, and that the search is cut short."""
         task.interrupted()
         cut_short.append(True)
 
-    proofs = run_heuristic(PROVING, replace(task, interrupted=interrupted)).proofs
+    proofs = run_heuristic(PROVING, replace(task, interrupted=note_interruption)).proofs
     assert proofs is not None
     kept.keep(proofs, sizes, cut_short=bool(cut_short))
     raise PartFinished
@@ -197,18 +198,19 @@ def _make_criterion_inputs(
     Asking raises DataError if a needed model or nominal accelerations are missing.
     """
 
-    def modelled(criterion: str) -> Model:
+    def require_model(criterion: str) -> Model:
+        """Return the model; raise DataError if there is none."""
         if model is None:
             raise DataError(f"the criterion {criterion} needs a model; give a CONFIG.")
         return model
 
     @cache
     def counts() -> Counts:
-        return Counts(modelled("operations"), counted)
+        return Counts(require_model("operations"), counted)
 
     @cache
     def dynamics() -> Dynamics:
-        return Dynamics(modelled("acceleration").mechanism)
+        return Dynamics(require_model("acceleration").mechanism)
 
     def accelerations(most: int) -> AccelerationData:
         """Samples spread evenly over the estimation set."""

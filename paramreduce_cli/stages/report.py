@@ -110,11 +110,13 @@ def report(
     formats = [str(name) for name in section.formats]
     drawn = [name for name, _ in _list_shown(figures, model)]
 
-    def tell(done: int, name: str = "") -> None:
+    def report_progress(done: int, name: str = "") -> None:
         run.progress(Progress("figures, tables and page", done, len(drawn) + 1, name))
 
-    tell(0)
-    encoded = render_figures(drawn, data, sorted({*formats, "svg"}), jobs=run.jobs, on_figure=tell)
+    report_progress(0)
+    encoded = render_figures(
+        drawn, data, sorted({*formats, "svg"}), jobs=run.jobs, on_figure=report_progress
+    )
     images = {name: one["svg"] for name, one in encoded.items()}
     files = {
         f"figures/{name}.{kind}": one[kind] for name, one in encoded.items() for kind in formats
@@ -133,7 +135,7 @@ def report(
         provenance,
         _export_code(model, reduction, validation, provenance),
     ).encode()
-    tell(len(drawn) + 1)
+    report_progress(len(drawn) + 1)
     return Report(summary, files)
 
 

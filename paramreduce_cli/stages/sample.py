@@ -88,7 +88,8 @@ def sample(
         )
     dynamics = Dynamics(model.mechanism)
 
-    def observed(name: str, points: int | None) -> ComputedSet:
+    def make_set(name: str, points: int | None) -> ComputedSet:
+        """Return a set from the log, the simulation, a recording or the trajectories; None if there is none."""
         recording: Recording | None = getattr(recordings, name)
         if sampling.log is not None:
             return _sample_log(model, dynamics, log, name)
@@ -106,7 +107,7 @@ def sample(
     points = {"estimation": sampling.points, "validation": sampling.validation_points}
     tested = _is_tested(sampling, trajectories, recordings)
     names = SETS if tested else SETS[:2]
-    computed = {name: observed(name, points.get(name)) for name in names}
+    computed = {name: make_set(name, points.get(name)) for name in names}
     stored = _combine_items(computed, items, report_progress)
     if stored is not None:
         return _make_samples(sampling, model, stored["estimation"], stored)
@@ -341,12 +342,13 @@ def _make_input(section: InputSection | None, rng: np.random.Generator) -> Input
 def _read_motion_states(motions: list[SimulatedMotion]) -> StatesAt:
     """Return a function that gives the states of simulated motions."""
 
-    def at(span: Span) -> StateBlock:
+    def read_span(span: Span) -> StateBlock:
+        """Return the states of a span of the motions."""
         motion, part = motions[span.trajectory], slice(span.start, span.stop)
         states = motion.time[part], motion.z[part], motion.dz[part], motion.ddz[part]
         return StateBlock(span.trajectory, *states, motion.tau[part])
 
-    return at
+    return read_span
 
 
 def _compute_measured_torques(model: Model, source: str, tau: FloatArray) -> FloatArray:
@@ -386,7 +388,8 @@ def _iterate_states(series: list[FloatArray], period: float, points: int, finer:
             evaluate_basis(period, harmonics, finer_times[: finer * count]) if finer > 1 else None,
         )
 
-    def at(span: Span) -> StateBlock:
+    def evaluate_span(span: Span) -> StateBlock:
+        """Return the states of a span of the series."""
         coefficients = shift_start(series[span.trajectory], period, times[span.start])
         own, between = basis((coefficients.shape[1] - 1) // 2, span.stop - span.start)
         positions = None if between is None else between.evaluate(coefficients)[0]
@@ -395,19 +398,20 @@ def _iterate_states(series: list[FloatArray], period: float, points: int, finer:
             span.trajectory, times[span.start : span.stop], *states, fine_positions=positions
         )
 
-    return at
+    return evaluate_span
 
 
 def _chain_states(count: int, first: StatesAt, second: StatesAt) -> StatesAt:
     """Return a function that gives the states of motions of one kind, then of another."""
 
-    def at(span: Span) -> StateBlock:
+    def evaluate_span(span: Span) -> StateBlock:
+        """Return the states of a span of the first or the second sequence."""
         if span.trajectory < count:
             return first(span)
         own = second(replace(span, trajectory=span.trajectory - count))
         return replace(own, trajectory=span.trajectory)
 
-    return at
+    return evaluate_span
 
 
 def _read_recorded_states(r: Recording, starts: IntArray) -> StatesAt:
@@ -415,13 +419,14 @@ def _read_recorded_states(r: Recording, starts: IntArray) -> StatesAt:
     end.
     """
 
-    def at(span: Span) -> StateBlock:
+    def read_span(span: Span) -> StateBlock:
+        """Return the recorded states of a span."""
         first = starts[span.trajectory]
         part = slice(first + span.start, first + span.stop)
         tau = None if r.tau is None else r.tau[part]
         return StateBlock(span.trajectory, r.time[part], r.z[part], r.dz[part], r.ddz[part], tau)
 
-    return at
+    return read_span
 
 
 def _warn_of_still_joints(model: Model, recording: Recording) -> None:

@@ -227,6 +227,7 @@ def _measure(
             )
 
         def parts(blocks: Iterable[Block]) -> Iterator[Iterable[Block]]:
+            """Yield the blocks as a whole, or motion by motion."""
             if not by_motion:
                 return iter([blocks])
             return (own for _, own in groupby(blocks, lambda block: block.trajectory))
@@ -439,6 +440,7 @@ def _cross_validate(
         run.progress(Progress("cross-validation", k, len(methods), name))
 
         def select(other: SelectionProblem, heuristic: str = heuristic) -> Sequence[IntArray]:
+            """Return the subsets of a heuristic on other data, of the same sizes."""
             task = SelectionTask(TorqueObjective(other), reduction.rank, effort=quick)
             sizes = set(reduction.heuristics[heuristic].n.tolist())
             return [s for s in run_heuristic(heuristic, task).subsets if s.size in sizes]
@@ -474,7 +476,8 @@ def _measure_stability(
     def factor(factors: FloatArray) -> FloatArray:
         return merge_factor(combine_factors(factors, weights), grouped.columns)
 
-    def chosen(other: SelectionProblem) -> IntArray:
+    def select(other: SelectionProblem) -> IntArray:
+        """Return the subset of the selected size on other data."""
         task = SelectionTask(TorqueObjective(other), selected.n, smallest=selected.n, effort=quick)
         found = run_heuristic(heuristic, task).subsets
         # With groups the size itself may not come up on other data.
@@ -492,4 +495,4 @@ def _measure_stability(
             blocks = decimate_blocks(samples.estimation.iterate_blocks(), every)
             thinned = DataVariant(DataChange.THINNED, every)
             variants.append((thinned, factor(compute_joint_factors(blocks))))
-    return measure_stability(problem, variants, chosen, run.progress)
+    return measure_stability(problem, variants, select, run.progress)

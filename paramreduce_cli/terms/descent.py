@@ -292,11 +292,12 @@ def drop_candidates(histories: Sequence[SearchHistory], number: int) -> list[Sea
         for count, passed in entry.visited.items():
             costs[count] = min(passed.cost, costs.get(count, np.inf))
 
-    def best(history: SearchHistory) -> SearchHistory:
+    def keep_best(history: SearchHistory) -> SearchHistory:
+        """Return a history with only the candidates that no other history beats."""
         some = {count: one for count, one in history.visited.items() if one.cost <= costs[count]}
         return replace(history, visited=some)
 
-    return [entry if id(entry) in whole else best(entry) for entry in histories]
+    return [entry if id(entry) in whole else keep_best(entry) for entry in histories]
 
 
 def list_front(histories: Iterable[SearchHistory]) -> list[Simplified]:

@@ -214,10 +214,10 @@ def make_samples(
     parts = list(blocks)
     coordinates = coordinates or Coordinates(mechanism, once=True)
 
-    def joined(key: str) -> FloatArray:
+    def join(key: str) -> FloatArray:
         return np.concatenate([getattr(part, key) for part in parts])
 
-    q, dq, ddq, tau, ddz = (joined(key) for key in ("q", "dq", "ddq", "tau", "ddz"))
+    q, dq, ddq, tau, ddz = (join(key) for key in ("q", "dq", "ddq", "tau", "ddz"))
     states = [q.T, dq.T, ddq.T]
     tangent = None
     if mechanism.loops is not None:

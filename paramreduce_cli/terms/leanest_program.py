@@ -95,21 +95,27 @@ def simplify(
     begins = _list_first(searcher, order_by_estimate(starts, smallest.model.n))
     meter = _ProgressMeter(progress, len(begins) + 2 * max_rounds + _CLOSELY)
 
-    def beside(ends: Sequence[SearchHistory], turn: int) -> NearbyStart:
+    def start_nearby(ends: Sequence[SearchHistory], turn: int) -> NearbyStart:
+        """Return a start near one of the best ends."""
         rng = np.random.default_rng([searcher.seed, turn, 1])
         best = find_leanest_histories(ends, _BEST)
         parent = best[turn % len(best)] if rng.random() > _DRAWN else draw_history(ends, rng)
         return NearbyStart(parent.start, [one.start for one in best], turn)
 
-    def before(ends: Sequence[SearchHistory], turn: int) -> Restart:
+    def start_again(ends: Sequence[SearchHistory], turn: int) -> Restart:
+        """Return a restart from shortly before one of the best ends."""
         best = find_leanest_histories(ends, _BEST)
         return Restart(best[turn % len(best)], turn)
 
     pays = meter.ahead * _estimate_work(searcher, begins) > _MANY
     with start_searchers(searcher, jobs if pays else 1, meter, deadline) as working:
         ends = working.map(Searcher.descend, [one.start for one in begins])
-        ends = _descend_further(working, ends, Searcher.descend_nearby, beside, max_rounds, meter)
-        ends = _descend_further(working, ends, Searcher.repeat_descent, before, max_rounds, meter)
+        ends = _descend_further(
+            working, ends, Searcher.descend_nearby, start_nearby, max_rounds, meter
+        )
+        ends = _descend_further(
+            working, ends, Searcher.repeat_descent, start_again, max_rounds, meter
+        )
         best = find_leanest_histories(ends, _CLOSELY)
         meter.ahead = len(best)
         close = working.map(Searcher.descend_closely, best, however_late=True)

@@ -108,13 +108,14 @@ class Searcher:
     ) -> Callable[[Tape], TermSearch]:
         """Return a function that makes the term search of a program on some samples."""
 
-        def made(tape: Tape) -> TermSearch:
+        def make(tape: Tape) -> TermSearch:
+            """Return the term search of a program."""
             fitting = Fitting(
                 tape, start.model.n, some.samples, self.budget, some.watched, self.poses
             )
             return TermSearch(fitting, self.seed + turn)
 
-        return made
+        return make
 
 
 def _descend(descent: Descent, rng: np.random.Generator) -> SearchHistory | None:

@@ -247,6 +247,7 @@ class Tape:
         stands_for: list[int] = []
 
         def constant(number: float) -> int:
+            """Append a constant, and return the reference to it."""
             nodes.append(Node("constant", (), abs(number)))
             return 2 * (len(nodes) - 1) + (number < 0)
 

@@ -32,7 +32,8 @@ class Table:
         wrapped = [textwrap.wrap(self.header[k], max(widths[k], 1)) for k in columns]
         heading = [tuple(column) for column in zip_longest(*wrapped, fillvalue="")]
 
-        def aligned(cells: tuple[str, ...]) -> str:
+        def align(cells: tuple[str, ...]) -> str:
+            """Return cells as a line with columns of equal width."""
             padded = (
                 cell + " " * (width - _count_columns(cell))
                 for cell, width in zip(cells, widths, strict=True)
@@ -40,7 +41,7 @@ class Table:
             return "  ".join(padded).rstrip()
 
         rule = "  ".join("-" * width for width in widths)
-        body = [*map(aligned, heading), rule, *map(aligned, self.rows)]
+        body = [*map(align, heading), rule, *map(align, self.rows)]
         return "\n".join([self.title, "", *body]) + "\n"
 
     def to_csv(self) -> str:

@@ -72,13 +72,14 @@ def export_trajectory(
     start = None if pose is None else expand_per_joint(pose, loaded.n_dof)
     planner = PathPlanner(model, trajectories)
 
-    def timed(which: str) -> TimedMotion:
+    def make_motion(which: str) -> TimedMotion:
+        """Return a trajectory at the rate of the controller."""
         chosen, title = _find_chosen(trajectories, which), f"{loaded.robot} {which}"
         return sample_motion(
             model.mechanism, trajectories, chosen, rate=rate, title=title, start_pose=start, planner=planner
         )  # fmt: skip
 
-    which, motion = (which, timed(which)) if which else _find_first(trajectories, timed)
+    which, motion = (which, make_motion(which)) if which else _find_first(trajectories, make_motion)
     speed = float(np.abs(motion.dz[0]).max())
     at_rest = trajectories.rest_to_rest or pose is not None
     if not at_rest and kind in _RUN and not moving:

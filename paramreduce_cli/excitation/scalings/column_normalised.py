@@ -11,9 +11,10 @@ def column_normalised(W: FloatArray, beta: FloatArray, norm: float) -> tuple[Flo
     norms = np.maximum(np.sqrt(np.einsum("ij,ij->j", W, W)), np.finfo(float).tiny)
     scaled = W / norms
 
-    def pull(gram: FloatArray, C: FloatArray) -> FloatArray:
+    def pull_back(gram: FloatArray, C: FloatArray) -> FloatArray:
+        """Return the derivative with respect to W, given that with respect to the Gram matrix."""
         along = np.einsum("ij,ij->j", gram, C)  # the diagonal of S' (S C)
         result: FloatArray = scaled @ ((C - np.diag(along)) / norms)
         return result
 
-    return scaled, pull
+    return scaled, pull_back

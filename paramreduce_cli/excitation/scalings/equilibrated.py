@@ -22,12 +22,13 @@ def _divide_by_largest(
     size, fraction = _compute_largest(W, axis, norm)
     scaled = W / size
 
-    def pull(bar: FloatArray) -> FloatArray:
+    def pull_back(bar: FloatArray) -> FloatArray:
+        """Return the derivative with respect to W, given that with respect to the scaled matrix."""
         lost = np.sum(bar * scaled, axis=axis, keepdims=True)
         result: FloatArray = (bar - lost * fraction) / size
         return result
 
-    return scaled, pull
+    return scaled, pull_back
 
 
 def _compute_largest(W: FloatArray, axis: int, norm: float) -> tuple[FloatArray, FloatArray]:

@@ -217,12 +217,13 @@ class _Writer:
     def _make_language(self, *, batched: bool) -> Language:
         """Return C as a language; in batches, states are stored coordinate by coordinate."""
 
-        def element(array: Argument, k: int) -> str:
+        def write_element(array: Argument, k: int) -> str:
+            """Return the text of element k of an array."""
             column = batched and array.name != "phi"
             return f"{array.name}[{k} * n + k]" if column else f"{array.name}[{k}]"
 
         calls = {name: f"{name}{self._suffix}" for name in FUNCTIONS} | {"sign": "sign"}
-        return Language(calls, self.write_number, element)
+        return Language(calls, self.write_number, write_element)
 
     def write_batched(self, function: Function) -> dict[str, Any]:
         """Return the body of a batched function as fields of the template.

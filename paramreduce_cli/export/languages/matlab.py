@@ -81,24 +81,34 @@ def _test(model: ExportedModel) -> str:
     sizes = model.collect_arrays()
     count = len(next(iter(model.cases.values())))
 
-    def literal(values: FloatArray) -> str:
+    def write_literal(values: FloatArray) -> str:
+        """Return values as a matrix of MATLAB."""
         rows = np.reshape(values, (count, -1)).tolist()
         return f"[{'; '.join(' '.join(map(repr, row)) for row in rows)}]"
 
-    def one(array: str) -> str:
+    def write_case(array: str) -> str:
+        """Return the text of an array of case k, in its shape."""
         row = f"cases.{array}(k, :)"
         shape = sizes[array].shape if array in sizes else (1,)
         return f"{row}'" if len(shape) == 1 else f"reshape({row}, {shape[1]}, {shape[0]})'"
 
     def checks(what: str, results: list[str]) -> str:
         return "\n".join(
-            f"  failures = failures + differs('{what}, {r}', {r}, {one(r)}, cases.{r}, {model.least[r]!r});"
+            f"  failures = failures + differs('{what}, {r}', {r}, {write_case(r)}, cases.{r}, {model.least[r]!r});"
             for r in results
         )
 
-    cases = {key: literal(values) for key, values in model.cases.items()}
-    arguments = {f.name: ", ".join(one(a.name) for a in f.arguments) for f in model.functions}
+    cases = {key: write_literal(values) for key, values in model.cases.items()}
+    arguments = {
+        f.name: ", ".join(write_case(a.name) for a in f.arguments) for f in model.functions
+    }
     text = render_template(
-        "test.m", model=model, cases=cases, count=count, one=one, arguments=arguments, checks=checks
+        "test.m",
+        model=model,
+        cases=cases,
+        count=count,
+        one=write_case,
+        arguments=arguments,
+        checks=checks,
     )
     return text.rstrip("\n")

@@ -91,10 +91,11 @@ def _test(model: ExportedModel) -> str:
     """Return the self-test of the module."""
     sizes = model.collect_arrays()
 
-    def literal(name: str, values: FloatArray) -> str:
+    def write_literal(name: str, values: FloatArray) -> str:
+        """Return the assignment of values to a name."""
         shape = sizes[name].shape if name in sizes else values.shape[1:]
         rows = np.reshape(values, (len(values), *shape))
         return f"{name} = np.array({rows.tolist()!r})"
 
-    cases = [literal(name, values) for name, values in model.cases.items()]
+    cases = [write_literal(name, values) for name, values in model.cases.items()]
     return render_template("test.py", model=model, cases=cases)

@@ -171,15 +171,16 @@ def _close(
     free = list(moving)
     start = loops.assembly
 
-    def whole(values: FloatArray) -> FloatArray:
+    def insert_free(values: FloatArray) -> FloatArray:
+        """Return the configuration with other values of the free coordinates."""
         q = start.copy()
         q[free] = values
         return q
 
     found = scipy.optimize.least_squares(
-        lambda values: equations.evaluate(whole(values)),
+        lambda values: equations.evaluate(insert_free(values)),
         start[free],
-        jac=lambda values: equations.compute_jacobian(whole(values))[:, free],
+        jac=lambda values: equations.compute_jacobian(insert_free(values))[:, free],
         method="trf",
         x_scale="jac",
         xtol=1e-15,
@@ -187,7 +188,7 @@ def _close(
         gtol=1e-15,
         max_nfev=300,
     )
-    q = whole(found.x)
+    q = insert_free(found.x)
     gaps = np.abs(equations.evaluate(q))
     if gaps.max() > _ASSEMBLED:
         worst = int(np.argmax(gaps))

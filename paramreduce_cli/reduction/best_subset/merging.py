@@ -106,13 +106,14 @@ def merge_proofs(proofs: Sequence[Proofs]) -> Proofs:
 def _merge_size(proofs: Sequence[Proofs]) -> Proofs:
     """Return the strongest proof of one size."""
 
-    def worth(proofs: Proofs) -> tuple[bool, float, float, int]:
+    def rank_proof(proofs: Proofs) -> tuple[bool, float, float, int]:
+        """Return the rank of a proof: finished before unfinished, then smaller errors, then higher bounds."""
         unfinished = proofs.status[0] is ProofStatus.BEST_FOUND
         error, bound = float(proofs.torque_error[0]), float(proofs.lower_bound[0])
         return unfinished, error, -bound, -int(proofs.nodes[0])  # of equal ones the furthest search
 
     return replace(
-        min(proofs, key=worth), lower_bound=np.max([one.lower_bound for one in proofs], axis=0)
+        min(proofs, key=rank_proof), lower_bound=np.max([one.lower_bound for one in proofs], axis=0)
     )
 
 

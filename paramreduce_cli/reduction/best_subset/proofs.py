@@ -160,17 +160,18 @@ class ProofSearch:
         """Compile the search, and say so where that has not been done on this machine before."""
         announced = threading.Event()
 
-        def tell(done: int) -> None:
+        def report(done: int) -> None:
+            """Report the progress of compiling."""
             announced.set()
             what = "compile the search for best subsets, once for all runs"
             self._task.progress(Progress(what, done, 1))
 
-        late = threading.Timer(_LONG, tell, (0,))
+        late = threading.Timer(_LONG, report, (0,))
         late.start()
         compile_search()
         late.cancel()
         if announced.is_set():
-            tell(1)
+            report(1)
 
     def _list_open(self) -> list[_Proof]:
         """Return the sizes of this job that are not proven yet."""
@@ -189,6 +190,7 @@ class ProofSearch:
         waiting = self._list_open()
 
         def work(proof: _Proof) -> None:
+            """Search for one size until its slice of nodes or the time is used up."""
             if stop.is_set() or time.monotonic() > deadline:
                 return  # to deal subtrees alone would take a while
             before = self._spent.get(proof.n, 0)
@@ -271,6 +273,7 @@ class ProofSearch:
         """
 
         def work(proof: _Proof) -> None:
+            """Raise the bound of one size by searches for much smaller errors."""
             known = np.sqrt(proof.squared_bound / proof.squared_error)
             for fraction in (fraction for fraction in _SHARES if fraction > known):
                 search = self._start_search(proof, factor=fraction**2)
@@ -353,7 +356,8 @@ class ProofSearch:
         """Return the proofs of some sizes as a record."""
         rank = self._rank
 
-        def status(proof: _Proof) -> ProofStatus:
+        def find_status(proof: _Proof) -> ProofStatus:
+            """Return the status of a proof, also of sizes beyond the rank."""
             done = (
                 proof.status == ProofStatus.OPTIMAL
                 and proof.n > rank
@@ -367,7 +371,7 @@ class ProofSearch:
             subsets=tuple(self._problem.columns[p.subset] for p in proofs),
             torque_error=np.sqrt([p.squared_error for p in proofs]),
             lower_bound=np.sqrt([p.squared_bound for p in proofs]),
-            status=tuple(map(status, proofs)),
+            status=tuple(map(find_status, proofs)),
             seconds=np.array([p.seconds for p in proofs]),
             nodes=np.array([p.nodes for p in proofs], dtype=np.int64),
             logs=tuple(p.log for p in proofs),

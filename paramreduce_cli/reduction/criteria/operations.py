@@ -123,6 +123,7 @@ class OperationsObjective(Objective):
         }
 
         def estimate_score(swap: tuple[int, int, float]) -> float:
+            """Return the estimated score after a swap."""
             out, into, error = swap
             return (more[into] - less[out]) / self._all + self._compute_penalty(error)
 

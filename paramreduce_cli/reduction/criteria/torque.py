@@ -208,8 +208,9 @@ def _compute_removal_costs(X: FloatArray, y: FloatArray, groups: list[IntArray])
 def _compute_rise(X: FloatArray, y: FloatArray, part: IntArray) -> float:
     """Return the rise of the squared error without some columns, from two fits."""
 
-    def squared_error(kept: FloatArray) -> float:
+    def compute_squared_error(kept: FloatArray) -> float:
+        """Return the squared error of the fit with some columns."""
         left = y - kept @ np.linalg.lstsq(kept, y, rcond=DEPENDENT)[0] if kept.size else y
         return float(left @ left)
 
-    return squared_error(np.delete(X, part, axis=1)) - squared_error(X)
+    return compute_squared_error(np.delete(X, part, axis=1)) - compute_squared_error(X)
