@@ -214,8 +214,8 @@ def _make_missing_hint(
 
 
 def _make_smoothing_hint(name: str, speed: float) -> Callable[[float, float], str | None]:
-    """Return a function that words the hint at smooth friction from the fitted coefficient and the share of the
-    residuals.
+    """Return a function that turns the fitted coefficient and the fraction of the residuals that it explains into a
+    hint at smooth friction.
     """
 
     def word_hint(coefficient: float, fraction: float) -> str:
@@ -243,7 +243,9 @@ def _make_scale_hint(name: str) -> Callable[[float, float], str | None]:
 
 
 def _make_delay_hint(step: float, known_delay: float) -> Callable[[float, float], str | None]:
-    """Return a function that words the hint at a delay of torques; it returns None for delays far below a time step."""
+    """Return a function that turns the fitted delay and the fraction of the residuals that it explains into a hint;
+    None for delays far below a time step.
+    """
 
     def word_hint(coefficient: float, fraction: float) -> str | None:
         """Return the hint, or None for a delay far below a time step."""
@@ -259,7 +261,9 @@ def _make_delay_hint(step: float, known_delay: float) -> Callable[[float, float]
 
 
 def _make_tilt_hint(axis: str, gravity: float) -> Callable[[float, float], str | None]:
-    """Return a function that words the hint at a tilted base; it returns None for small angles."""
+    """Return a function that turns the fitted acceleration and the fraction of the residuals that it explains into a
+    hint at a tilted base; None for small angles.
+    """
 
     def word_hint(coefficient: float, fraction: float) -> str | None:
         """Return the hint, or None for a small angle."""

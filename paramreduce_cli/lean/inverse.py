@@ -133,7 +133,9 @@ def select_part(body: Inertia, choice: JointFormulation, place: InertiaPlace) ->
 
 
 def select_gauge(state: JointState, choice: JointFormulation, place: InertiaPlace) -> Gauge:
-    """Return the gauge that the moments of inertia multiplied at a recursion step satisfy.
+    """Return the gauge that the inertia used at a recursion step has: which part s (1 - z z') has been moved to the
+    parent body. Return NONE if the moments of inertia are not all used at this step, or if the rotation to it has mixed
+    them again.
 
     Return NONE if Izz and the moments across the axis are not all multiplied there, or if the rotation to that step has
     undone the gauge.

@@ -53,7 +53,7 @@ class Symbols:
         return (x, y, z)
 
     def read_coordinate(self, i: int, derivative: int) -> Scalar:
-        """Return the coordinate of joint i as described, or its first or second derivative."""
+        """Return the coordinate of joint i in the sign of the robot's description, or its first or second derivative."""
         position = self._start + derivative * len(self._joints) + i
         return Scalar(self.graph, self.graph.input(position))
 

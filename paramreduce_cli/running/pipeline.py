@@ -97,7 +97,7 @@ class Stage:
 
     @property
     def needs_config(self) -> bool:
-        """Whether it cannot run on brought samples alone."""
+        """Whether the stage cannot run on user-supplied samples without a config."""
         made = {entry.type for entry in self.artifacts if not entry.optional}
         on_samples = Samples in made and made <= {Samples, Reduction, Validation}
         return not on_samples or not all(has_default(entry.type) for entry in self.sections)

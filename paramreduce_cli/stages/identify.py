@@ -138,7 +138,9 @@ def _estimate_model(
 def _compute_errors(
     part: SampleSet, standard: FloatArray, deviation: FloatArray
 ) -> tuple[float, FloatArray]:
-    """Return the error of all joints together, and the root mean squares joint by joint."""
+    """Return the norm of all residuals relative to that of the torques, and the root mean square of the residuals of
+    each joint, (n_dof,).
+    """
     measured = np.isfinite(deviation)
     left, whole = np.zeros(measured.size), np.zeros(measured.size)
     for block in part.iterate_blocks():

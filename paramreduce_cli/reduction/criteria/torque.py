@@ -181,7 +181,9 @@ class TorqueObjective(Objective):
 
 
 def _compute_removal_costs(X: FloatArray, y: FloatArray, groups: list[IntArray]) -> FloatArray:
-    """Return the cost of removing each group per column, (n_groups,); infinite where other removals are free."""
+    """Return the rise of the squared error by removing each group, per column, (n_groups,); infinite if other removals
+    cost nothing.
+    """
     columns = np.concatenate(groups)
     sizes = np.array([group.size for group in groups])
     parts = np.split(np.arange(columns.size), np.cumsum(sizes)[:-1])
