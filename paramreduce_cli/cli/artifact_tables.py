@@ -124,7 +124,9 @@ def _summarise_test(errors: FloatArray) -> FloatArray:
 def _tabulate_by_size(
     title: str, errors: dict[str, tuple[IntArray, FloatArray]], width: int
 ) -> Table:
-    """Return a table with a row for every number of parameters and a column for every heuristic that fits."""
+    """Return a table with a row for every number of parameters, and a column for as many heuristics as the width
+    allows; the title names the others.
+    """
     names = list(errors)
     used, count = 4, 0
     while count < len(names) and used + len(names[count]) + 2 <= width:

@@ -330,7 +330,11 @@ class _Search:
         )
 
     def compute_kappa(self, series: FloatArray) -> float:
-        """Return the condition number in the scaling of the settings."""
+        """Return the condition number of W along a series, in the scaling of the settings.
+
+        Args:
+            series: Coefficients of a Fourier series, (n_dof, 1 + 2 harmonics).
+        """
         _, q = compute_fine_positions(self._excitation, self._settings, series)
         _, dz, ddz = self._grid.basis.evaluate(series)
         return self._excitation.compute_condition_numbers(q[::FINER], dz, ddz)[

@@ -18,7 +18,7 @@ _MOST_CHARACTERS = 60
 
 @dataclass_transform(frozen_default=True)
 def record(cls: type[Record]) -> type[Record]:
-    """Make a class a frozen dataclass with a short text."""
+    """Make a class a frozen dataclass whose ``repr`` has at most ten lines."""
     cls.__repr__ = format_record  # type: ignore[method-assign]
     return dataclass(frozen=True, repr=False)(cls)
 

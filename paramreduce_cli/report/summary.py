@@ -155,7 +155,7 @@ def _summarise_proofs(reduction: Reduction) -> list[dict[str, Any]]:
 def _summarise_model_choice(
     reduction: Reduction, validation: Validation, choice: ModelChoice
 ) -> dict[str, Any]:
-    """Return a model of the Pareto front."""
+    """Return the entry of a model of the Pareto front: its parameters, errors on the estimation set and operations."""
     heuristic, n = choice.heuristic, choice.n
     result = validation.heuristics[heuristic]
     row = result.find_row(n)

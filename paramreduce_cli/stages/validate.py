@@ -265,7 +265,9 @@ def _compute_ranges(sets: Sequence[NormErrors]) -> tuple[FloatArray, FloatArray]
 
 
 def _measure_torques(samples: Samples, reduction: Reduction) -> _Measured:
-    """Return the torque errors of all models; NaN for all that needs a mechanism."""
+    """Return the torque errors of all models of samples without a robot; accelerations, mass matrices and operations
+    are NaN.
+    """
     if samples.validation is None:
         raise DataError(
             "the samples hold no validation set: /validation/W and /validation/tau are missing."

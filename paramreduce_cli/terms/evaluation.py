@@ -244,7 +244,9 @@ class Evaluator:
 
     @property
     def _random_poses(self) -> Iterator[TermSamples]:
-        """Random states on which mass matrices are looked at, in parts: those of the errors, and of trees others."""
+        """Random states, in portions, on which mass matrices are tested: those on which errors are computed, and for
+        trees additional ones.
+        """
         yield from self._random_sets
         if self._model.mechanism.loops is None:
             for some in self._sample_states(_MASSES - _TORQUES):

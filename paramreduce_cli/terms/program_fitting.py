@@ -295,7 +295,9 @@ class Fitting:
         return compute_roots(caused, self._torque_scale / self.budget.torque)
 
     def _weigh(self, torques: FloatArray, metric: FloatArray | None) -> FloatArray:
-        """Return torques weighted as in the cost, (k, n_rows)."""
+        """Return torque differences multiplied by the metric, or, without a metric, divided by the budget and the
+        nominal torques, (k, n_rows).
+        """
         if metric is None:
             scaled = torques * (self._torque_scale / self.budget.torque)[:, None]
         else:
