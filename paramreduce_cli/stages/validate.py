@@ -267,6 +267,9 @@ def _compute_ranges(sets: Sequence[NormErrors]) -> tuple[FloatArray, FloatArray]
 def _measure_torques(samples: Samples, reduction: Reduction) -> _Measured:
     """Return the torque errors of all models of samples without a robot; accelerations, mass matrices and operations
     are NaN.
+
+    Raises:
+        DataError: The samples hold no validation set.
     """
     if samples.validation is None:
         raise DataError(

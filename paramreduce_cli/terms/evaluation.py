@@ -284,8 +284,10 @@ class Evaluator:
 def _compute_bounds(
     limits: JointLimits, independent: list[int], lower: FloatArray, upper: FloatArray
 ) -> FloatArray:
-    """Return the smallest and largest q, dq and ddq inside limits, (2, 3, n_q); without a limit of rates, as fast as
-    the data are, (3, n_q).
+    """Return the smallest and largest q, dq and ddq of random states, (2, 3, n_q).
+
+    Independent coordinates have their limits, or the range of the data if a limit is missing; dependent ones are at
+    most as fast as in the data.
     """
     rates = np.array([limits.velocity, limits.acceleration])
     known = np.array([np.vstack([limits.lower, -rates]), np.vstack([limits.upper, rates])])
