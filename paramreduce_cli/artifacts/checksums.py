@@ -129,7 +129,7 @@ class CheckedRows:
         return values
 
     def _compare_checksums(self, values: np.ndarray, first: int) -> None:
-        """Raise OSError if a checksum does not match."""
+        """Raise OSError if a block of rows does not match its checksum or has none; only for datasets with checksums."""
         assert self._checks is not None
         for k, start in enumerate(range(0, len(values), self._rows), start=first):
             found = xxhash.xxh3_64_intdigest(values[start : start + self._rows].data)

@@ -255,7 +255,9 @@ def load_table(reader: Reader, record: type, path: str) -> tuple[Any, ...]:
 
 
 def _get_entry_type(hint: Any) -> Any:
-    """Return the type of the entries of a tuple or mapping, or None."""
+    """Return the type of the entries of a tuple or of the values of a mapping, also of an optional one; None for other
+    types.
+    """
     origin, arguments = typing.get_origin(hint), typing.get_args(hint)
     if origin in (typing.Union, types.UnionType):
         return _get_entry_type(next(a for a in arguments if a is not type(None)))

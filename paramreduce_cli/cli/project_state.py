@@ -69,7 +69,7 @@ def _is(path: Path, kind: Callable[[Path], bool]) -> bool:
 
 
 def list_results(folder: Path) -> list[Path]:
-    """Return the folders of finished runs in ``results`` of a folder, or in the folder itself."""
+    """Return the folders of finished runs: those in ``results`` of a folder, then those in the folder itself."""
     return [
         path
         for place in (folder / _RESULTS, folder)

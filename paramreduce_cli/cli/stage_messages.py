@@ -13,7 +13,9 @@ def say_outcome(outcome: Outcome) -> None:
 
 
 def say_verdict(accepted: bool | None, verdict: str, quiet: bool) -> int:
-    """Print whether the selected model is accepted; return the exit code."""
+    """Print the verdict on the selected model, a rejection even if quiet; return the exit code, which is zero unless
+    the model is rejected.
+    """
     if accepted is False:
         print_error(f"Not accepted: {verdict}")
         return NOT_ACCEPTED

@@ -381,7 +381,7 @@ def _warn_of_limits(config: Config) -> Iterator[str]:
 
 
 def _warn_of_terms(config: Config) -> Iterator[str]:
-    """Yield warnings about budgets that restrict nothing."""
+    """Yield a warning if there is a budget of acceleration errors, but the direct dynamics are not pruned."""
     terms = config.terms
     if (
         terms is not None
@@ -392,7 +392,9 @@ def _warn_of_terms(config: Config) -> Iterator[str]:
 
 
 def _warn_of_drives(config: Config) -> Iterator[str]:
-    """Yield warnings about drives with unknown or impossible values."""
+    """Yield warnings about drives: unknown values that the model takes as zero, and negative values of what cannot be
+    negative.
+    """
     sampling = config.sampling
     missing = {name: drive.list_unknown() for name, drive in config.list_drives().items()}
     found = [f"{' and '.join(keys)} of {name}" for name, keys in missing.items() if keys]

@@ -56,7 +56,10 @@ def has_default(kind: type) -> bool:
 
 
 def get_section(config: Config | Settings | None, kind: type) -> Any:
-    """Return a section of a config or of settings, or its default if there are neither."""
+    """Return a section of a config or of settings, or its default if these are None or lack the section.
+
+    The default of an optional section is None; ``Robot`` is the config itself.
+    """
     if kind is Robot:
         return config
     path = _list_keys()[kind]

@@ -217,9 +217,11 @@ def _evaluate_function(
 
 
 def find_unsafe_mass_matrices(M: FloatArray) -> str:
-    """Describe what is wrong with the mass matrices of random states; return an empty text if nothing is."""
-    values = np.linalg.eigvalsh(M)
-    bad = int(np.sum(values[:, 0] <= SINGULAR_MASS * np.abs(values).max()))
+    """Describe how many mass matrices are not finite, singular or not positive definite, (n_states, n, n); empty if none."""
+    finite = np.isfinite(M).all(axis=(1, 2))
+    values = np.linalg.eigvalsh(M[finite])
+    singular = values[:, 0] <= SINGULAR_MASS * np.abs(values).max(initial=0.0)
+    bad = int(np.sum(~finite) + np.sum(singular))
     if not bad:
         return ""
     return f"M is singular or not positive definite on {bad} of {len(M)} random states"

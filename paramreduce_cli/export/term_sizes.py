@@ -18,7 +18,8 @@ _SMALLEST = 1e-300
 def estimate_term_sizes(
     mechanism: Mechanism, model: ReducedModel, stored: Mapping[str, FloatArray]
 ) -> dict[str, float]:
-    """Estimate a lower bound of the magnitude of each result, which errors are divided by.
+    """Return the smallest magnitudes that errors of each result are divided by, by its name: a thousandth of a bound of
+    the terms that it is the sum of.
 
     Args:
         mechanism: The robot.

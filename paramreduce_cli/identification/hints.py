@@ -97,7 +97,9 @@ def find_hints(
 
 
 def _hint_at_large_errors(full: Estimate) -> Iterator[str]:
-    """Yield hints at a wrong log or robot if errors are large."""
+    """Yield hints at a wrong log or robot if the training error is large, or the held-out error much larger than the
+    training error.
+    """
     if full.train > _HARDLY:
         yield (
             f"All base parameters together leave {format_percent(full.train)} of the torques unexplained: is the log of this "

@@ -136,7 +136,9 @@ def _is_frozen(signals: Signals, rows: slice) -> bool:
 
 
 def _find_largest_speeds(signals: Signals) -> FloatArray:
-    """Return the largest speeds that joints keep for some samples, recorded or from positions, (n_dof,)."""
+    """Return the largest speed that each joint keeps for some samples, (n_dof,): from the positions, or as recorded if
+    that is larger.
+    """
     speeds = []
     for j in range(signals.z.shape[1]):
         smooth = scipy.ndimage.median_filter(signals.z[:, j], _WINDOW, mode="nearest")

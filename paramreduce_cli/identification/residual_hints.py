@@ -153,7 +153,10 @@ def _list_signals(
     sliding: Sequence[bool],
     modelled: Collection[str],
 ) -> Iterator[_Signal]:
-    """Yield the signals that residuals may contain, joint by joint."""
+    """Yield the signals that residuals may contain: those of each measured joint, then delay and tilt.
+
+    Terms that are part of the model are tried too; their hint suggests another form.
+    """
 
     def _missing(name: str, what: str, unit: str, key: str) -> Callable[[float, float], str]:
         return _make_missing_hint(what, unit, name, f"drives.{name}.{key}", modelled)

@@ -88,7 +88,7 @@ def write_mjcf(
 
 
 def _write_inertia(mujoco: Any, body: Any, inertial: Inertial) -> None:
-    """Replace the inertia of a body."""
+    """Replace the ``inertial`` element of a body's XML element by one with principal moments and axes."""
     sizes, axes = np.linalg.eigh(inertial.tensor)
     if np.linalg.det(axes) < 0:
         axes[:, 0] = -axes[:, 0]

@@ -123,7 +123,9 @@ def _explain_choice(
     heuristic: str,
     n: int,
 ) -> str:
-    """Return a sentence that says why the model was chosen."""
+    """Return a sentence that says why a model was chosen by tolerances: whether it is proven to be the smallest within
+    them, or has the smallest error if only operations are limited.
+    """
     who = f"{heuristic} with n = {n}"
     if set(tolerances) == {"operations"}:
         return f"{who} has the smallest torque error with {_format_tolerances(tolerances)}."

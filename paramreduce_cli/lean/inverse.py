@@ -137,9 +137,6 @@ def select_gauge(state: JointState, choice: JointFormulation, place: InertiaPlac
     parent body. Return NONE if the moments of inertia are not all used at this step, or if the rotation to it has mixed
     them again.
 
-    Return NONE if Izz and the moments across the axis are not all multiplied there, or if the rotation to that step has
-    undone the gauge.
-
     Args:
         place: Recursion step at which the moments are to be computed; steps other than the chosen one have no gauge.
         state: State of the joint.

@@ -97,7 +97,8 @@ class Objective(ABC):
         return tuple(dict.fromkeys(owner[int(c)] for c in columns))
 
     def add_best(self, kept: Subset, most: int) -> Subset:
-        """Return the subset with the most beneficial group added, or the subset itself if no group may be added.
+        """Return the subset with the group appended whose estimated gain per column is largest, or the subset itself if
+        no group fits or all are ruled out.
 
         Args:
             kept: Subset of groups.

@@ -147,7 +147,7 @@ def _compare_numbers(part: str) -> Quantity:
 def _compare_rows(
     where: str, part: str, x: Mapping[str, Any], y: Mapping[str, Any], tolerance: Tolerance
 ) -> Iterator[Difference]:
-    """Compare the entries of one quantity of one model."""
+    """Yield every difference between the entries of one quantity of one model, also tolerable ones, which are marked."""
     yield from _compare_exactly(f"{part}, {where}", sorted(x), sorted(y))
     for key in x.keys() & y.keys():
         one, two = _list_values(x[key]), _list_values(y[key])

@@ -138,8 +138,8 @@ def _estimate_model(
 def _compute_errors(
     part: SampleSet, standard: FloatArray, deviation: FloatArray
 ) -> tuple[float, FloatArray]:
-    """Return the norm of all residuals relative to that of the torques, and the root mean square of the residuals of
-    each joint, (n_dof,).
+    """Return the norm of the residuals of all measured joints relative to that of their torques, unweighted, and the
+    root mean square residual of each joint, (n_dof,), NaN for joints that are not measured.
     """
     measured = np.isfinite(deviation)
     left, whole = np.zeros(measured.size), np.zeros(measured.size)

@@ -283,6 +283,7 @@ def test_wrong_files_get_one_message(tmp_path, invoke, old, new, says):
         (["--tip", "thumb"], "--tip thumb"),
         (["--root", "finger"], "no joint is left that moves"),
         (["--lock", "shoulder"], "write JOINT=VALUE"),
+        (["--lock", "0.5"], "write JOINT=VALUE"),
         (["--lock", "knee=1"], "--lock knee"),
         (["--ignore", "hand"], "--ignore hand"),
         (["--root", "slide", "--tip", "upper"], "is not carried by the root slide"),

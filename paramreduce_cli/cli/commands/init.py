@@ -220,6 +220,8 @@ def _parse_lock(text: str) -> tuple[str, float]:
     """
     joint, _, value = text.rpartition("=")
     try:
+        if not joint:
+            raise ValueError
         number = parse_number(value)
     except ValueError as error:
         raise ConfigError(f"--lock {text}: write JOINT=VALUE with a number, rad or m.") from error

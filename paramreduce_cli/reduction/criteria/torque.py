@@ -181,8 +181,8 @@ class TorqueObjective(Objective):
 
 
 def _compute_removal_costs(X: FloatArray, y: FloatArray, groups: list[IntArray]) -> FloatArray:
-    """Return the rise of the squared error by removing each group, per column, (n_groups,); infinite if other removals
-    cost nothing.
+    """Return the cost of removing each group, per column, (n_groups,): the rise of the squared error, or infinity if
+    other removals are free; free ones are compared by the squares of their minimum-norm parameters.
     """
     columns = np.concatenate(groups)
     sizes = np.array([group.size for group in groups])
