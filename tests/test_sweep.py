@@ -1,5 +1,6 @@
 """Lists of runs, and the commands that they stand for."""
 
+import re
 import shlex
 from pathlib import Path
 
@@ -12,7 +13,7 @@ from paramreduce_cli.errors import ConfigError
 from paramreduce_cli.records import Part
 from paramreduce_cli.running import workflow
 from paramreduce_cli.running.pipeline import list_stages
-from paramreduce_cli.running.sweep import Sweep, load_sweep
+from paramreduce_cli.running.sweep import Sweep, SweepRun, load_sweep
 from paramreduce_cli.running.workflow import format_slurm_script
 
 STAGES = {stage.name: stage for stage in list_stages()}
@@ -155,3 +156,15 @@ def test_a_thousand_parts_take_few_calls(tmp_path):
     text = format_slurm_script(sweep)
     assert text.count("\nsubmit ") == 8
     assert [len(phase) for phase in sweep.list_phases("1")] == [4, 1000, 4, 1000, 4, 1000, 4, 1]
+
+
+def test_the_snakefile_calls_methods_that_exist():
+    """Ordinary tests do not run Snakemake, and renames do not reach its file."""
+    text = (CONFIGS.parent / "pipelines" / "Snakefile").read_text()
+    called = {
+        SweepRun: set(re.findall(r"sweep\.runs\[w\.run\]\.(\w+)\(", text)),
+        Sweep: set(re.findall(r"\bsweep\.(\w+)\(", text)),
+    }
+    for kind, names in called.items():
+        assert names
+        assert names <= set(dir(kind))
