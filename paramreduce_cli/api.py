@@ -264,10 +264,6 @@ def code(
         KeyError: The language is unknown; the message lists all languages.
         ParamreduceError: The functions differ from textbook recursion.
     """
-    if language not in languages:
-        raise KeyError(
-            f"unknown language {language!r}. Choose from: {', '.join(sorted(languages))}"
-        )
     exported = make_exported_model(
         model, parameters, title=title or f"{parameters.n} parameters",
         constant=constant, single=single, origin="from Python", validation=validation,

@@ -1,6 +1,6 @@
 """Registries: functions that a config or a command chooses by name.
 
-What a room offers are the files in its folder: ``forward_selection.py`` holds the function
+A subpackage offers the files in its folder: ``forward_selection.py`` holds the function
 ``forward_selection`` and is called forward-selection. So a new file is all it takes to add one,
 and names can be listed without importing what they stand for.
 """
@@ -39,14 +39,16 @@ class Registry:
 
     Args:
         kind: Kind of the entries, for messages.
-        room: Name of the subpackage whose ``__init__`` makes the registry.
+        package: Name of the subpackage whose ``__init__`` makes the registry.
     """
 
-    def __init__(self, kind: str, room: str) -> None:
+    def __init__(self, kind: str, package: str) -> None:
         self.kind = kind
-        self._files = _find_files(_PACKAGE.joinpath(*room.split(".")[1:]))
+        self._files = _find_files(_PACKAGE.joinpath(*package.split(".")[1:]))
 
     def __getitem__(self, name: str) -> Any:
+        if name not in self._files:
+            raise KeyError(f"unknown {self.kind} {name!r}. Choose from: {', '.join(self._files)}")
         path = self._files[name].relative_to(_PACKAGE.parent).with_suffix("")
         return getattr(importlib.import_module(".".join(path.parts)), path.stem)
 

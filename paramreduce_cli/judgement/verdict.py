@@ -6,7 +6,6 @@ import numpy as np
 
 from paramreduce_cli.config.schema import Acceptance
 from paramreduce_cli.records import (
-    INVERSE_ONLY,
     About,
     BoolArray,
     ErrorRange,
@@ -86,13 +85,13 @@ def _check_subsets(
     full: Mapping[str, int | float], result: HeuristicValidation
 ) -> Iterator[tuple[BoolArray, str, str]]:
     """Yield which subsets are not safe to use, why, and what that means for the selected model."""
-    unsafe = _find_unsafe(full, result)
+    unsafe = find_unsafe_models(full, result)
     last = int(result.n[unsafe].max(initial=0))
     yield (
         unsafe,
         f"n ≤ {last}: do not simulate; the mass matrix is indefinite on some samples, or more than "
         f"{_CONDITION_FACTOR:g} times nearer to singular than with all parameters.",
-        INVERSE_ONLY,
+        "is good for inverse dynamics only; do not simulate with it.",
     )
     for what in ("torque", "acceleration"):
         apart = _find_overfitted(result, what)
@@ -104,7 +103,7 @@ def _check_subsets(
         )
 
 
-def _find_unsafe(full: Mapping[str, int | float], result: HeuristicValidation) -> BoolArray:
+def find_unsafe_models(full: Mapping[str, int | float], result: HeuristicValidation) -> BoolArray:
     """Return which models have an indefinite or nearly singular mass matrix, (m,)."""
     if not full:  # nothing is known but torques
         return np.zeros(result.n.size, dtype=bool)

@@ -92,7 +92,6 @@ from paramreduce_cli.records.trajectories import (
     Trajectory,
 )
 from paramreduce_cli.records.validation import (
-    INVERSE_ONLY,
     About,
     CrossValidation,
     DataChange,

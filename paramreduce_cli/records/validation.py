@@ -123,10 +123,6 @@ class CrossValidation(BySize):
         return error
 
 
-INVERSE_ONLY = "is good for inverse dynamics only; do not simulate with it."
-"""End of the warning on a model whose mass matrix is indefinite or nearly singular."""
-
-
 class About(StrEnum):
     """The models that a warning is about."""
 

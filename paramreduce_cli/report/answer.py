@@ -4,7 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from paramreduce_cli.records import INVERSE_ONLY, About, ErrorRange, ReducedModel, Speed, Validation
+from paramreduce_cli.judgement.verdict import find_unsafe_models
+from paramreduce_cli.records import About, ErrorRange, ReducedModel, Speed, Validation
 from paramreduce_cli.report.data import NO_TORQUE, ReportData
 from paramreduce_cli.texts import format_percent
 from paramreduce_cli.texts.measured_values import format_measured
@@ -93,12 +94,10 @@ def _choose_kind(validation: Validation) -> str:
 
 def _choose_headline(validation: Validation) -> str:
     """Return what the selected model is good for, if it is good for one function only."""
-    unsafe = any(
-        warning.about is About.SELECTED and warning.text.endswith(INVERSE_ONLY)
-        for warning in validation.warnings
-    )
     if validation.accepted is False:
         return "Not accepted."
+    result = validation.heuristics[validation.selected.heuristic]
+    unsafe = find_unsafe_models(validation.full, result)[result.find_row(validation.selected.n)]
     return "Good for feed-forward; do not simulate with it." if unsafe else ""
 
 

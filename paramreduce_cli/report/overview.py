@@ -4,14 +4,15 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from paramreduce_cli.records import NO_MOTIONS, ErrorRange
+from paramreduce_cli.report.symbols import ACCELERATION_HEADINGS, TORQUE_HEADINGS
 from paramreduce_cli.texts import format_percent, format_percent_range
 from paramreduce_cli.texts.table import Table
 
 Summary = Mapping[str, Any]
 
 HEADER = (
-    "heuristic", "acting", "base", "n", "operations inverse, full", "operations inverse", "saved, inverse", "torque error est.", "torque error val.", "torque error test",
-    "operations direct, full", "operations direct", "saved, direct", "accel. error est.", "accel. error val.", "accel. error test",
+    "heuristic", "acting", "base", "n", "operations inverse, full", "operations inverse", "saved, inverse", *TORQUE_HEADINGS,
+    "operations direct, full", "operations direct", "saved, direct", *ACCELERATION_HEADINGS,
 )  # fmt: skip
 
 

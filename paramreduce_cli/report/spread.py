@@ -5,6 +5,7 @@ from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
+from paramreduce_cli.report.symbols import ACCELERATION_HEADINGS, TORQUE_HEADINGS
 from paramreduce_cli.texts import format_percent
 from paramreduce_cli.texts.table import Table
 
@@ -64,12 +65,8 @@ def tabulate_spread(records: Sequence[Mapping[str, Any]]) -> Table:
         "runs",
         "κ best",
         "n",
-        "torque error est.",
-        "torque error val.",
-        "torque error test",
-        "accel. error est.",
-        "accel. error val.",
-        "accel. error test",
+        *TORQUE_HEADINGS,
+        *ACCELERATION_HEADINGS,
         "operations inverse",
         "operations direct",
         "accepted",

@@ -1,7 +1,9 @@
-"""Meanings of short headings, printed under the tables that have them."""
+"""Headings that several tables share, and the meanings of headings, printed under the tables that have them."""
 
 from collections.abc import Mapping
 
+TORQUE_HEADINGS = ("torque error est.", "torque error val.", "torque error test")
+ACCELERATION_HEADINGS = ("accel. error est.", "accel. error val.", "accel. error test")
 _EVERYWHERE = {
     "n": "number of parameters of the reduced model",
     "acting": "standard parameters that act on the torques",

@@ -188,8 +188,8 @@ def _fit_consistent(
         return None
     except ImportError:
         warnings.warn(
-            "physical consistency is not checked, because cvxpy is missing; install it with "
-            "`pip install 'paramreduce[identify]'` does that",
+            "physical consistency is not checked, because cvxpy is missing; "
+            "`pip install 'paramreduce[identify]'` installs it",
             ParamreduceWarning,
             stacklevel=2,
         )

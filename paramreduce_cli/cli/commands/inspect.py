@@ -238,7 +238,9 @@ def _load_neighbour(file: Path, record: type) -> Any:
     try:
         return load_file(file, record, None, "")[0]
     except ArtifactError as error:
-        warnings.warn(f"its contents are not shown: {error}", ParamreduceWarning, stacklevel=2)
+        warnings.warn(
+            f"an artifact beside it is left out: {error}", ParamreduceWarning, stacklevel=2
+        )
         return None
 
 

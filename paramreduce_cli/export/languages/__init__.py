@@ -2,4 +2,4 @@
 
 from paramreduce_cli.registry import Registry
 
-languages = Registry("exporter", __name__)
+languages = Registry("language", __name__)

@@ -3,24 +3,21 @@
 from paramreduce_cli.records import ErrorRange
 from paramreduce_cli.report.data import ReportData
 from paramreduce_cli.report.page_sections import PageSection, placed
+from paramreduce_cli.report.symbols import ACCELERATION_HEADINGS, TORQUE_HEADINGS
 from paramreduce_cli.texts import format_percent, format_percent_range
 from paramreduce_cli.texts.table import Table
 
 
 @placed(PageSection.SAVINGS, 4, tall=True)
 def pareto_front(data: ReportData) -> Table:
-    """Models that no other model beats in all quantities: errors on the estimation (E), the validation (V) and the test
-    set (T; median and range).
+    """Models that no other model beats in all quantities: errors on the estimation, the validation and the test set
+    (median and range).
     """
     header = (
         "heuristic",
         "n",
-        "torque error est.",
-        "torque error val.",
-        "torque error test",
-        "accel. error est.",
-        "accel. error val.",
-        "accel. error test",
+        *TORQUE_HEADINGS,
+        *ACCELERATION_HEADINGS,
         "operations inverse",
         "operations direct",
     )

@@ -11,8 +11,8 @@ from paramreduce_cli.texts.table import Table
 def summary(data: ReportData) -> Table:
     """All heuristics at the selected number of parameters, both functions.
 
-    Errors on the estimation (E), the validation (V) and the test set (T), which no search uses; for T the median of all
-    motions, and their range.
+    Errors are on the estimation set, the validation set, and the test set, which no search uses; there they are the
+    median of all motions, and their range.
     """
     n = data.validation.selected.n
     full = data.validation.full

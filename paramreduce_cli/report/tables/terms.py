@@ -6,6 +6,7 @@ from paramreduce_cli.records import ErrorRange
 from paramreduce_cli.report.data import ReportData
 from paramreduce_cli.report.page_sections import PageSection, placed
 from paramreduce_cli.report.style import FUNCTIONS
+from paramreduce_cli.report.symbols import ACCELERATION_HEADINGS, TORQUE_HEADINGS
 from paramreduce_cli.texts import format_percent, format_percent_range
 from paramreduce_cli.texts.table import Table
 
@@ -14,11 +15,11 @@ from paramreduce_cli.texts.table import Table
 def terms(data: ReportData) -> Table:
     """Functions with pruned terms.
 
-    Errors on the estimation (E), the validation (V) and the test set (T), which no search uses, and on random states
-    inside the limits; smallest eigenvalue of all mass matrices.
+    Errors are on the estimation set, the validation set, the test set, which no search uses, and random states inside
+    the limits. The smallest eigenvalue is that of all mass matrices.
     """
     header = (
-        "function", "n", "operations", "before", "torque error est.", "torque error val.", "torque error test", "accel. error est.", "accel. error val.", "accel. error test", "torque error random",
+        "function", "n", "operations", "before", *TORQUE_HEADINGS, *ACCELERATION_HEADINGS, "torque error random",
         "accel. error random", "smallest eigenvalue",
     )  # fmt: skip
     rows = []
