@@ -4,7 +4,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from paramreduce_cli.judgement.verdict import find_unsafe_models
 from paramreduce_cli.records import About, ErrorRange, ReducedModel, Speed, Validation
 from paramreduce_cli.report.data import NO_TORQUE, ReportData
 from paramreduce_cli.texts import format_percent
@@ -78,7 +77,7 @@ def gather_answer(data: ReportData, options: str) -> Answer:
         weighted=_WEIGHTED[data.weighting],
         command=export if data.model is not None else f"{export} --format values",
         kind=_choose_kind(data.validation),
-        headline=_choose_headline(data.validation),
+        headline=_choose_headline(data),
         neighbours=_describe_neighbours(data.validation),
     )
 
@@ -92,13 +91,11 @@ def _choose_kind(validation: Validation) -> str:
     return "open" if validation.accepted is None else ""
 
 
-def _choose_headline(validation: Validation) -> str:
+def _choose_headline(data: ReportData) -> str:
     """Return what the selected model is good for, if it is good for one function only."""
-    if validation.accepted is False:
+    if data.validation.accepted is False:
         return "Not accepted."
-    result = validation.heuristics[validation.selected.heuristic]
-    unsafe = find_unsafe_models(validation.full, result)[result.find_row(validation.selected.n)]
-    return "Good for feed-forward; do not simulate with it." if unsafe else ""
+    return "Good for feed-forward; do not simulate with it." if data.unsafe else ""
 
 
 def _describe_neighbours(validation: Validation) -> str:

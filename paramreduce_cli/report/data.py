@@ -64,6 +64,8 @@ class ReportData(Artifacts):
     skeletons: tuple[Skeleton, ...]
     animation: Animation | None
     """Animation of the motions of both sets, where there is a mechanism."""
+    unsafe: bool
+    """Whether the selected model must not be simulated, as its mass matrix is indefinite or nearly singular."""
     speed: Speed | None
     """Speed of the inverse dynamics of the full and of the selected model; None without a robot."""
     speed_direct: Speed | None

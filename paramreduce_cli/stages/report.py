@@ -19,6 +19,7 @@ from paramreduce_cli.export.named_models import find_chosen_model
 from paramreduce_cli.export.running import RunningModel, measure_speeds
 from paramreduce_cli.fields.section import expand_per_joint
 from paramreduce_cli.judgement.leanest import find_leanest
+from paramreduce_cli.judgement.verdict import find_unsafe_models
 from paramreduce_cli.multibody.loops.coordinates import Coordinates
 from paramreduce_cli.records import (
     SETS,
@@ -81,6 +82,7 @@ def report(
 
     model, reduction, validation = artifacts.model, artifacts.reduction, artifacts.validation
     selected = validation.selected
+    judged = validation.heuristics[selected.heuristic]
     shown = samples.validation if samples.validation is not None else samples.estimation
     motion = find_first_motion(shown.iterate_blocks(), selected.model)
     running = _compile_models(model, selected, Exported.IDM)
@@ -97,6 +99,7 @@ def report(
         motion=motion,
         skeletons=() if model is None else _draw_skeletons(section, model, motion),
         animation=None if model is None else _make_animation(model, samples),
+        unsafe=bool(find_unsafe_models(validation.full, judged)[judged.find_row(selected.n)]),
         speed=measure_speeds(running, states) if running else None,
         speed_direct=measure_speeds(direct, states) if direct else None,
         tracking=_simulate_tracking(section, model, running, motion),

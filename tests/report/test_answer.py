@@ -10,7 +10,7 @@ import types
 import h5py
 import numpy as np
 import pytest
-from conftest import CONFIGS
+from conftest import CONFIGS, TWO_LINK
 
 from paramreduce_cli.cli.commands.run import run
 from paramreduce_cli.records import Block, Estimate
@@ -128,3 +128,21 @@ def test_a_motion_is_shown_from_its_beginning_to_its_end(sizes):
     assert shown.time.size > 100 or every == 1
     np.testing.assert_array_equal(shown.full, states["tau"][::every])
     np.testing.assert_allclose(shown.reduced, W[::every] @ phi)
+
+
+@pytest.mark.parametrize(
+    ("n", "accept", "headline"),
+    [(1, "{}", "Good for feed-forward; do not simulate with it."),
+     (1, "{torque_error_test: 1e-9}", "Not accepted."),
+     (4, "{}", "")],
+)  # fmt: skip
+def test_the_verdict_begins_with_what_the_model_is_good_for(
+    invoke, two_link_copy, n, accept, headline
+):
+    settings = [f"selected.n={n}", f"validation.accept={accept}", "report.formats=[svg]"]
+    common = (TWO_LINK, "--results", two_link_copy)
+    invoke("validate", *common, settings=settings, code=int(headline == "Not accepted."))
+    invoke("report", *common, settings=settings)
+    page = (two_link_copy / "report" / "index.html").read_text()
+    verdict = re.search(r'<p class="verdict[^>]*>(<b>.*?</b>)?', page)[1] or ""
+    assert verdict == (f"<b>{headline}</b>" if headline else "")
