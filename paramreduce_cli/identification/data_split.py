@@ -7,7 +7,7 @@ import numpy as np
 from paramreduce_cli.config.log_settings import LogSection
 from paramreduce_cli.identification.signals import Signals
 
-_STILL = 2e-3
+STILL = 2e-3
 """Share of a joint's range within which it stands still."""
 _ROUNDING = 1e-9
 _SHORTEST = 20
@@ -42,7 +42,7 @@ def trim_files(pieces: list[Signals], section: LogSection) -> list[Piece]:
         starts, ends = [], []
         for j in range(pieces[0].z.shape[1]):
             z = np.concatenate([piece.z[:, j] for piece in pieces])
-            still = _STILL * max(np.ptp(z), 1e-12)
+            still = STILL * max(np.ptp(z), 1e-12)
             starts += np.flatnonzero(np.abs(z - z[0]) > still)[:1].tolist()
             ends += np.flatnonzero(np.abs(z - z[-1]) > still)[-1:].tolist()
         if starts:

@@ -24,6 +24,8 @@ _IN_A_ROW = 5
 """Frequencies below that, one after the other, that end the motion's band."""
 _SEGMENTS = 4
 """Segments of the log in a spectrum: the longer, the finer in frequency."""
+_OUTPUTS_AT_ONCE = 64
+"""Filtered samples that are computed as one product of matrices."""
 _DERIVATIVE = np.array([1 / 280, -4 / 105, 1 / 5, -4 / 5, 0.0, 4 / 5, -1 / 5, 4 / 105, -1 / 280])
 """Central differences of eighth order."""
 
@@ -96,6 +98,27 @@ def filter_samples(
         operator[row, output - k : output + k + 1] = taps
     result: FloatArray = operator @ rows
     return result
+
+
+def filter_outputs(rows: FloatArray, taps: FloatArray, outputs: np.ndarray) -> FloatArray:
+    """Return some samples of filtered signals that are extended at both ends by their point reflection.
+
+    Args:
+        rows: Signals, (n_samples, n).
+        taps: Coefficients of a symmetric filter, (2 k + 1,).
+        outputs: Indices of the requested samples, ascending.
+
+    Returns:
+        (n_outputs, n)
+    """
+    k = taps.size // 2
+    extended = np.column_stack([_extend(column, k) for column in rows.T])
+    parts = [
+        filter_samples(extended[some[0] : some[-1] + 2 * k + 1], int(some[0]) - k, taps, some)
+        for some in np.split(outputs, range(_OUTPUTS_AT_ONCE, outputs.size, _OUTPUTS_AT_ONCE))
+        if some.size
+    ]
+    return np.concatenate([np.zeros((0, rows.shape[1])), *parts])
 
 
 def estimate_spectrum(columns: Iterable[FloatArray], rate: float) -> tuple[FloatArray, FloatArray]:

@@ -9,6 +9,7 @@ import numpy as np
 from paramreduce_cli.config.log_settings import Frequency, LogSection
 from paramreduce_cli.errors import ConfigError, DataError
 from paramreduce_cli.identification import filters
+from paramreduce_cli.identification.cutoff_selection import ComputeColumns, select_cutoffs
 from paramreduce_cli.identification.data_split import Piece, split_pieces, trim_files
 from paramreduce_cli.identification.log_checks import find_log_warnings
 from paramreduce_cli.identification.log_signals import (
@@ -21,7 +22,13 @@ from paramreduce_cli.identification.log_signals import (
 from paramreduce_cli.identification.outliers import replace_outliers
 from paramreduce_cli.identification.position_jumps import find_position_jumps, name_rows
 from paramreduce_cli.identification.signals import Signals, read_signals, resample_evenly
+from paramreduce_cli.identification.state_estimation import (
+    Cutoffs,
+    choose_decimation,
+    estimate_states,
+)
 from paramreduce_cli.records import (
+    CutoffSearch,
     FloatArray,
     IntArray,
     MeasuredLog,
@@ -32,33 +39,23 @@ from paramreduce_cli.records import (
     RawLogs,
     Spectra,
 )
-from paramreduce_cli.resources.scratch import allocate_matrix, stack_rows
+from paramreduce_cli.resources.scratch import stack_rows
+from paramreduce_cli.texts import format_percent
 
 UNUSED = -1
 """Fold of samples that only serve filters."""
-_PER_TORQUE_CUTOFF = 40
-"""Samples per period of the torque cut-off in which the observation matrix is filtered."""
-_PER_STATE_CUTOFF = 6
-"""Samples per period of the state cut-off that motions are kept with."""
 _USED_PER_CUTOFF = 10
 """Samples per period of the torque cut-off that are used."""
-_ANTI_ALIAS = 0.4
-"""Cut-off of the low-pass before thinning, a share of the rate after it."""
 _FEWEST_USED = 20
 _SAME_RATE = 0.01
 _WORK = ("clean", "spectra", "low-pass and differentiate", "look at them")
 """What is told of."""
 
 
-@dataclass(frozen=True)
-class _Cutoffs:
-    """The cut-off frequencies of states and torques, Hz."""
-
-    state: float
-    torque: float
-
-
-_TOO_SHORT = "the log leaves hardly any samples {}. Bring a longer one, or cut off less."
+_TOO_SHORT = (
+    "the log leaves hardly any samples {}. Use a longer log, raise sampling.log.torque_cutoff and state_cutoff, as the "
+    "low-pass is longer than the motion, or trim less."
+)
 
 
 def process_logs(
@@ -67,8 +64,12 @@ def process_logs(
     names: Sequence[str],
     report_progress: ProgressCallback = lambda _: None,
     unmeasured: Collection[str] = (),
+    compute_columns: ComputeColumns | None = None,
 ) -> MeasuredLog:
     """Process logs for identification.
+
+    Automatic cut-off frequencies are chosen by cross-validation if there is a model, otherwise by the spectrum of the
+    speeds.
 
     Args:
         logs: Logs as recorded.
@@ -76,6 +77,8 @@ def process_logs(
         names: Names of the independent coordinates.
         report_progress: Progress callback.
         unmeasured: Coordinates without torques.
+        compute_columns: Function that returns the base parameters' columns of the observation matrix; None without a
+            model.
 
     Raises:
         ConfigError: A setting does not fit the robot or the log.
@@ -118,12 +121,17 @@ def process_logs(
     before = decimate_recorded(place.get_pieces(raw, tested_raw), rate)
     begin(1)
     spectra = _estimate_spectra(longest, rate)
-    cutoffs = _choose_cutoffs(section, spectra, rate, steps)
-    thin = _choose_decimation(section, cutoffs, rate)
+    given = _read_cutoffs(section, rate)
+    search = None
+    if compute_columns is not None and None in given:
+        measured = np.array([name not in unmeasured for name in names])
+        search = select_cutoffs(raw, rate, spectra, compute_columns, measured, given, section.folds)
+    cutoffs = _choose_cutoffs(given, spectra, search, steps)
+    thin = choose_decimation(cutoffs, rate, section.rate or rate)
 
     def ready(pieces: list[Piece]) -> list[Piece]:
         """Nothing of one piece is in another: they are low-passed apart."""
-        return [_process_piece(piece, rate, cutoffs, thin) for piece in pieces]
+        return [estimate_states(piece, rate, cutoffs, thin) for piece in pieces]
 
     steps.append(_describe_states(longest, thin, rate / thin))
     begin(2)
@@ -155,6 +163,7 @@ def process_logs(
             files.outliers[place.file],
         ),
         spectra=spectra,
+        search=search,
         steps=tuple(steps),
         warnings=tuple(warnings),
     )
@@ -290,22 +299,19 @@ def _estimate_spectra(piece: Signals, rate: float) -> Spectra:
     return Spectra(frequency[1:], velocity[1:], torque[1:])
 
 
-def _choose_cutoffs(
-    section: LogSection, spectra: Spectra, rate: float, steps: list[str]
-) -> _Cutoffs:
-    """Return the cut-off frequencies that the config gives, or that the spectra suggest.
+def _read_cutoffs(section: LogSection, rate: float) -> tuple[float | None, float | None]:
+    """Return the cut-off frequencies of states and torques that the config gives, Hz; None for automatic ones.
 
     Raises:
         ConfigError: A given cut-off is not below half of the rate.
     """
-    band = filters.find_motion_band(spectra.frequency, spectra.velocity)
 
-    def choose(given: Frequency, automatic: float, key: str) -> float:
-        """Return a cut-off frequency: infinite for none, the automatic one, or the given one."""
+    def read(given: Frequency, key: str) -> float | None:
+        """Return a cut-off frequency: infinite for none, None for an automatic one."""
         if given == "none":
             return np.inf
         if given == "auto":
-            return automatic
+            return None
         if float(given) >= rate / 2:
             raise ConfigError(
                 f"is {float(given):g} Hz, but the log is recorded at {rate:g} Hz; a cut-off is below half of "
@@ -314,13 +320,55 @@ def _choose_cutoffs(
             )
         return float(given)
 
-    state = choose(section.state_cutoff, band, "state_cutoff")
-    torque = choose(section.torque_cutoff, band, "torque_cutoff")
+    return read(section.state_cutoff, "state_cutoff"), read(section.torque_cutoff, "torque_cutoff")
+
+
+def _choose_cutoffs(
+    given: tuple[float | None, float | None],
+    spectra: Spectra,
+    search: CutoffSearch | None,
+    steps: list[str],
+) -> Cutoffs:
+    """Return the cut-off frequencies that the config gives, that a search has found, or that the spectrum suggests."""
+    if search is not None:
+        steps += _describe_search(search, given)
+        return Cutoffs(search.state, search.torque)
+    band = filters.find_motion_band(spectra.frequency, spectra.velocity)
+    state, torque = (band if value is None else value for value in given)
     steps.append(
         f"Speeds stand out of their noise up to {band:.3g} Hz. Positions and speeds: {_describe_low_pass(state)}; "
         f"torques and observation matrix: {_describe_low_pass(torque)}."
     )
-    return _Cutoffs(state, torque)
+    return Cutoffs(state, torque)
+
+
+def _describe_search(
+    search: CutoffSearch, given: tuple[float | None, float | None]
+) -> Iterator[str]:
+    """Yield sentences on the chosen cut-off frequencies and their neighbours."""
+    yield (
+        f"Up to {search.scored:.3g} Hz the model explains most of the torques' power. Positions and speeds: "
+        f"{_describe_low_pass(search.state)}; torques and observation matrix: {_describe_low_pass(search.torque)}."
+    )
+    for value, name, cutoffs, errors, chosen in (
+        (given[0], "state", search.states, search.state_errors, search.state),
+        (given[1], "torque", search.bands, search.torque_errors, search.torque),
+    ):
+        if value is None:
+            k = int(np.flatnonzero(cutoffs == chosen)[0])
+            shown = sorted({0, max(0, k - 1), k, min(k + 1, cutoffs.size - 1), cutoffs.size - 1})
+            listed = ", ".join(
+                f"{format_percent(float(errors[i]))} {_describe_cutoff(float(cutoffs[i]))}"
+                for i in shown
+            )
+            yield (
+                f"Cross-validation within the training part compares {cutoffs.size} {name} cut-offs; torques up to "
+                f"{search.scored:.3g} Hz are missed by {listed}."
+            )
+
+
+def _describe_cutoff(cutoff: float) -> str:
+    return "without a low-pass" if np.isinf(cutoff) else f"at {cutoff:.3g} Hz"
 
 
 def _describe_low_pass(cutoff: float) -> str:
@@ -330,18 +378,7 @@ def _describe_low_pass(cutoff: float) -> str:
     return f"zero-phase low-pass at {cutoff:.3g} Hz"
 
 
-def _choose_decimation(section: LogSection, cutoffs: _Cutoffs, rate: float) -> int:
-    """Return the decimation factor of the motions."""
-    if np.isfinite(cutoffs.torque):
-        needed = _PER_TORQUE_CUTOFF * cutoffs.torque
-        if np.isfinite(cutoffs.state):
-            needed = max(needed, _PER_STATE_CUTOFF * cutoffs.state)
-    else:
-        needed = section.rate or rate
-    return max(1, int(rate / needed + 1e-9))
-
-
-def _choose_output_rate(section: LogSection, cutoffs: _Cutoffs, rate: float) -> float:
+def _choose_output_rate(section: LogSection, cutoffs: Cutoffs, rate: float) -> float:
     """Return the rate of the samples that are used, Hz."""
     usual = rate if np.isinf(cutoffs.torque) else _USED_PER_CUTOFF * cutoffs.torque
     return rate / max(1, int(rate / (section.rate or usual) + 1e-9))
@@ -354,38 +391,6 @@ def _check_left(parts: list[list[Piece]], sources: list[str], section: LogSectio
                 f"{source}: too few samples are left for training after sampling.log.trim "
                 f"{section.trim} and standstill. Use a longer log, or trim less."
             )
-
-
-def _process_piece(piece: Piece, rate: float, cutoffs: _Cutoffs, thin: int) -> Piece:
-    """Return a low-passed, differentiated and decimated piece; joints are processed one by one to save memory."""
-    s = piece.signals
-    state = filters.design_low_pass(cutoffs.state, rate)
-    torque = np.ones(1)
-    if thin > 1 and np.isfinite(cutoffs.torque):
-        torque = filters.design_low_pass(_ANTI_ALIAS * rate / thin, rate)
-    known = s.dz is not None and s.ddz is not None
-    if known and thin == state.size == torque.size == 1:
-        return piece
-    time = s.time[::thin]
-    z, dz, ddz, tau = (allocate_matrix(time.size, s.z.shape[1]) for _ in range(4))
-    for j in range(s.z.shape[1]):
-        made = _process_joint(s.get_joint(j), rate, state, torque)
-        for whole, values in zip((z, dz, ddz, tau), made, strict=True):
-            whole[:, j] = values[::thin, 0]
-    return Piece(Signals(time, z, dz, ddz, tau), piece.first, piece.last)
-
-
-def _process_joint(
-    s: Signals, rate: float, state: FloatArray, torque: FloatArray
-) -> tuple[FloatArray, ...]:
-    """Return z, dz, ddz and tau of one joint after their filters, (n_samples, 1) each."""
-    if np.ptp(s.z) == 0:  # round-off of filters would be taken for a motion
-        still = np.zeros_like(s.z)
-        return s.z, still, still, filters.apply_filter(s.tau, torque)
-    z = filters.apply_filter(s.z, state)
-    dz = filters.differentiate(z, rate) if s.dz is None else filters.apply_filter(s.dz, state)
-    ddz = filters.differentiate(dz, rate) if s.ddz is None else filters.apply_filter(s.ddz, state)
-    return z, dz, ddz, filters.apply_filter(s.tau, torque)
 
 
 def _join_pieces(pieces: list[Piece], folds: int) -> MeasuredMotions:
@@ -459,7 +464,7 @@ def _describe_split(
     return f"{text}; {cut:.3g} s at the ends are cut off." if cut * rate >= 1 else f"{text}."
 
 
-def _estimate_noise(learned: MeasuredMotions, cutoffs: _Cutoffs, rate: float) -> FloatArray:
+def _estimate_noise(learned: MeasuredMotions, cutoffs: Cutoffs, rate: float) -> FloatArray:
     """Return the standard deviation of the torques above the band of the model, (n_dof,)."""
     cutoff = cutoffs.torque if np.isfinite(cutoffs.torque) else cutoffs.state
     taps = filters.design_low_pass(cutoff, rate)

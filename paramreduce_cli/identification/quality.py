@@ -10,7 +10,7 @@ from paramreduce_cli.multibody.base_parameters import choose_base, find_affectin
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.multibody.observation import combine_factors
 from paramreduce_cli.multibody.random_states import draw_states
-from paramreduce_cli.records import BoolArray, FloatArray, MeasuredLog, Mechanism
+from paramreduce_cli.records import BaseParameters, BoolArray, FloatArray, MeasuredLog
 
 _STATES = 200
 """Random states on which the base parameters are found."""
@@ -34,21 +34,30 @@ class LogQuality:
     """Base parameters that can hardly be told from the others."""
 
 
-def measure_quality(mechanism: Mechanism, log: MeasuredLog, measured: BoolArray) -> LogQuality:
-    """Return how well the training part of a log excites a robot's base parameters.
+def find_base(dynamics: Dynamics, measured: BoolArray) -> BaseParameters:
+    """Return the base parameters that the measured torques of random states tell.
 
     Args:
-        mechanism: Mechanism of the robot.
-        log: Processed log.
+        dynamics: Dynamics of the robot.
         measured: Coordinates whose torques are measured, (n_dof,).
     """
-    dynamics = Dynamics(mechanism, once=True)
+    mechanism = dynamics.mechanism
     states = draw_states(mechanism, _STATES, np.random.default_rng(0))
     K = dynamics.compute_regressor(*states)[:, measured]
     affects = find_affecting_parameters(mechanism, K)
-    base = choose_base(
+    return choose_base(
         K.reshape(-1, K.shape[2]), mechanism.preference_order, _RANK_TOLERANCE, affects
     )
+
+
+def measure_quality(dynamics: Dynamics, base: BaseParameters, log: MeasuredLog) -> LogQuality:
+    """Return how well the training part of a log excites a robot's base parameters.
+
+    Args:
+        dynamics: Dynamics of the robot.
+        base: Base parameters of the robot.
+        log: Processed log.
+    """
     factors = LoggedSet(log.training, log, dynamics, "training part").compute_factors()
     scale = np.sqrt(np.sum(factors[..., -1] ** 2, axis=(0, 2)))
     scale = np.where(scale > 0, scale, np.inf)
@@ -57,7 +66,7 @@ def measure_quality(mechanism: Mechanism, log: MeasuredLog, measured: BoolArray)
     X = W / np.where(lengths > 0, lengths, 1.0)
     sizes = np.linalg.svd(X, compute_uv=False)
     rank = int(np.sum(sizes > _DEPENDENT * sizes[0]))
-    names = [mechanism.parameter_names[k] for k in base.columns]
+    names = [dynamics.mechanism.parameter_names[k] for k in base.columns]
     left = _compute_independent_fractions(X, lengths)
     order = np.argsort(left)
     return LogQuality(

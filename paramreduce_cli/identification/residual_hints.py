@@ -16,6 +16,8 @@ from paramreduce_cli.identification.uncertainty import compute_score_covariance
 from paramreduce_cli.multibody.orthogonal import solve_least_squares
 from paramreduce_cli.records import FloatArray
 
+_ROUNDING = 1e-9
+"""Share of the largest value below which a value is round-off."""
 _SURE = 5.0
 """Standard deviations from zero at which a signal is there."""
 _SHARE = 0.02
@@ -292,7 +294,8 @@ def hint_at_negative_friction(
         values: Values of the friction parameters, (n,).
         deviations: Standard deviations, (n,).
     """
-    wrong: list[int] = np.flatnonzero(values < -_SURE * deviations).tolist()
+    rounding = _ROUNDING * np.abs(values).max(initial=0.0)
+    wrong: list[int] = np.flatnonzero(values < -_SURE * deviations - rounding).tolist()
     joints = list(dict.fromkeys(owners[k] for k in wrong))
     if not joints:
         return []

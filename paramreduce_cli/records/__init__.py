@@ -9,6 +9,7 @@ from paramreduce_cli.records.artifacts import Artifacts
 from paramreduce_cli.records.items import WHOLE, Items, Part, PartFinished
 from paramreduce_cli.records.logs import (
     Consistency,
+    CutoffSearch,
     Estimate,
     Identification,
     MeasuredLog,

@@ -111,6 +111,31 @@ class Spectra:
 
 
 @record
+class CutoffSearch:
+    """The cut-off frequencies of a log chosen by cross-validation, and the errors with others.
+
+    All errors are relative errors of the torques in the scored band on folds that were left out.
+    """
+
+    state: float
+    """Chosen cut-off frequency of positions and speeds, Hz."""
+    torque: float
+    """Chosen cut-off frequency of torques and observation matrix, Hz."""
+    scored: float
+    """Frequency up to which torques are scored, Hz: up to it the model explains most of their power."""
+    states: FloatArray
+    """State cut-offs that were tried, ascending, Hz; infinite for no low-pass, (n_states,)."""
+    state_errors: FloatArray
+    """Errors with these, fitted to the scored band, (n_states,)."""
+    bands: FloatArray
+    """Torque cut-offs that were tried, ascending, Hz, (n_bands,)."""
+    torque_errors: FloatArray
+    """Errors of parameters that were fitted to torques up to these, with the chosen state cut-off, (n_bands,)."""
+    unexplained: FloatArray
+    """Share of the power between each of these and the one before that the model leaves, (n_bands,)."""
+
+
+@record
 class MeasuredLog:
     """A log made ready: motions to train on and motions held out, and what was done to them."""
 
@@ -136,6 +161,8 @@ class MeasuredLog:
     """The same of all joints together, a share of the torques."""
     shown: ShownSignals
     spectra: Spectra
+    search: CutoffSearch | None
+    """Search for cut-off frequencies; None if the config gives both, or without a model."""
     steps: tuple[str, ...]
     """Processing steps, one sentence each."""
     warnings: tuple[str, ...]

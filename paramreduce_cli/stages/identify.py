@@ -10,6 +10,7 @@ from paramreduce_cli.identification import consistency as physics
 from paramreduce_cli.identification.estimation import LinearFit, collect_rows, fit_robustly
 from paramreduce_cli.identification.hints import find_hints
 from paramreduce_cli.identification.model_comparison import compare_held_out
+from paramreduce_cli.multibody.noise import estimate_joint_noise
 from paramreduce_cli.multibody.observation import combine_factors
 from paramreduce_cli.multibody.orthogonal import solve_least_squares
 from paramreduce_cli.records import (
@@ -28,7 +29,6 @@ from paramreduce_cli.records import (
     Validation,
 )
 from paramreduce_cli.reduction.models import make_base_model
-from paramreduce_cli.reduction.noise import estimate_joint_noise
 
 _STEPS = 3
 _MOST_SHOWN = 1500

@@ -6,7 +6,9 @@ import numpy as np
 
 from paramreduce_cli.config.log_settings import LogSection
 from paramreduce_cli.errors import ConfigError, ParamreduceWarning
+from paramreduce_cli.identification.cutoff_selection import make_column_function
 from paramreduce_cli.identification.processing import process_logs
+from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.records import MeasuredLog, Model, ProgressCallback, RawLogs
 
 
@@ -38,7 +40,9 @@ def process_log(
     unmeasured = [
         name for name, size in zip(names, model.nominal_torque, strict=True) if np.isinf(size)
     ]
-    found = process_logs(logs, log, names, report_progress, unmeasured)
+    dynamics = Dynamics(model.mechanism, once=True)
+    compute_columns = make_column_function(dynamics, model.base.columns)
+    found = process_logs(logs, log, names, report_progress, unmeasured, compute_columns)
     for text in found.warnings:
         warnings.warn(f"log: {text.rstrip('.')}", ParamreduceWarning, stacklevel=2)
     return found

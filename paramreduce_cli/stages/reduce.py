@@ -14,6 +14,7 @@ from paramreduce_cli.errors import ConfigError, DataError, ParamreduceWarning
 from paramreduce_cli.judgement.torque_errors import NormErrors, compute_torque_errors
 from paramreduce_cli.lean.counting import Counts
 from paramreduce_cli.multibody.dynamics import Dynamics
+from paramreduce_cli.multibody.noise import estimate_joint_noise
 from paramreduce_cli.multibody.observation import (
     combine_factors,
     compute_standard_deviation,
@@ -43,7 +44,6 @@ from paramreduce_cli.reduction.criteria import criteria
 from paramreduce_cli.reduction.fitting import Fit
 from paramreduce_cli.reduction.grouping import merge_factor
 from paramreduce_cli.reduction.inputs import AccelerationData, CriterionInputs
-from paramreduce_cli.reduction.noise import estimate_joint_noise
 from paramreduce_cli.reduction.objective import Objective
 from paramreduce_cli.reduction.setup import SIZES, make_columns, make_effort, make_problem
 from paramreduce_cli.reduction.task import SelectionTask

@@ -29,7 +29,7 @@ def used(motions):
 
 
 def test_the_last_share_is_held_out_and_folds_are_equal_parts_in_time():
-    found = made(two_link_log(), folds=4)
+    found = made(two_link_log(), folds=4, state_cutoff="none")
     learned, tested = used(found.training), used(found.held_out)
     assert learned.max() < tested.min()
     assert tested.size == pytest.approx(0.4 * (learned.size + tested.size), abs=2)
@@ -100,7 +100,7 @@ def test_files_are_read_one_at_a_time():
 
 def test_held_out_files():
     other = RawLog("other.csv", two_link_log(seed=1), 2)
-    found = made(two_link_log(), other, held_out=["other.csv"])
+    found = made(two_link_log(), other, held_out=["other.csv"], state_cutoff="none")
     assert np.count_nonzero(found.training.fold != UNUSED) > 0.99 * found.training.time.size
     assert any("by file" in step for step in found.steps)
 

@@ -38,8 +38,10 @@ def check_data(file: Path, config: Path | None, overrides: tuple[str, ...]) -> N
     """
     # Late: these load all numerics.
     from paramreduce_cli.artifacts.log_files import load_log
+    from paramreduce_cli.identification.cutoff_selection import make_column_function
     from paramreduce_cli.identification.processing import process_logs
-    from paramreduce_cli.identification.quality import measure_quality
+    from paramreduce_cli.identification.quality import find_base, measure_quality
+    from paramreduce_cli.multibody.dynamics import Dynamics
     from paramreduce_cli.records import RawLogs
 
     if file.suffix in (".yaml", ".yml"):
@@ -49,6 +51,7 @@ def check_data(file: Path, config: Path | None, overrides: tuple[str, ...]) -> N
         )
     loaded = load_config(config, overrides) if config is not None else None
     raw = load_log(file)
+    logs = RawLogs((raw,), ())
     names = list(raw.columns)
     mechanism = None if loaded is None else loaded.build_mechanism()
     joints = _format_joints(names) if mechanism is None else list(mechanism.coordinate_names)
@@ -56,14 +59,23 @@ def check_data(file: Path, config: Path | None, overrides: tuple[str, ...]) -> N
     if section is None:
         columns = ColumnsSection(**guess_columns(names, joints))  # type: ignore[arg-type]
         section = LogSection(files=[file], columns=columns)
-    usual = LogSection.model_fields["held_out"].default
-    section = section.model_copy(update={"held_out": usual} if section.held_out_files else {})
+    if file.resolve() in map(Path.resolve, section.files):
+        # The log of the config is processed as `run` processes it.
+        logs = RawLogs(map(load_log, section.files), map(load_log, section.held_out_files))
+    elif section.held_out_files:
+        usual = LogSection.model_fields["held_out"].default
+        section = section.model_copy(update={"held_out": usual})
     with locate_errors(config, overrides):
-        unmeasured = [] if loaded is None else loaded.unmeasured
-        log = process_logs(RawLogs((raw,), ()), section, joints, unmeasured=unmeasured)
-        found = None
-        if mechanism is not None and loaded is not None:
-            found = measure_quality(mechanism, log, loaded.find_measured())
+        if mechanism is None or loaded is None:
+            log, found = process_logs(logs, section, joints), None
+        else:
+            dynamics = Dynamics(mechanism, once=True)
+            base = find_base(dynamics, loaded.find_measured())
+            compute_columns = make_column_function(dynamics, base.columns)
+            log = process_logs(
+                logs, section, joints, unmeasured=loaded.unmeasured, compute_columns=compute_columns
+            )
+            found = measure_quality(dynamics, base, log)
     for text in log.steps:
         say(text)
     table = rich.table.Table(box=rich.box.SIMPLE, pad_edge=False, collapse_padding=True)
