@@ -20,7 +20,7 @@ reduction:
 
 selected:
   heuristic: swap
-  cross_validation: true        # the smallest model that the training data cannot tell from the best
+  cross_validation: true        # the smallest model that is hardly worse than the best one
 """
 
 

@@ -312,8 +312,8 @@ class SelectedSection(Section):
     """Largest acceleration error, a share."""
     operations: Positive | None = None
     """Most operations of the inverse dynamics."""
-    cross_validation: bool = False
-    """Whether the size is chosen by leaving out one part of the estimation set at a time: the smallest model whose error is within one standard error of the best; the validation set is not looked at."""
+    cross_validation: bool | Literal["parsimonious"] = False
+    """Whether the size is chosen by leaving out one part of the estimation set at a time; the validation set is not looked at. `true` selects the smallest model that is at most 3 % worse than the best one and than all parameters, at the upper end of a 90 % interval; `parsimonious` the smallest one within one standard error of the best."""
 
     @model_validator(mode="after")
     def _check_one_rule(self) -> SelectedSection:

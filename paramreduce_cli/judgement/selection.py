@@ -4,7 +4,12 @@ from collections.abc import Mapping
 
 from paramreduce_cli.config.schema import SelectedSection
 from paramreduce_cli.errors import ConfigError, DataError
-from paramreduce_cli.judgement.cross_validation import choose_by_one_standard_error
+from paramreduce_cli.judgement.cross_validation import (
+    LARGEST_LOSS,
+    choose_by_bounded_loss,
+    choose_by_one_standard_error,
+    find_best,
+)
 from paramreduce_cli.judgement.model_selection import (
     Pick,
     compute_worst_ratios,
@@ -17,6 +22,7 @@ from paramreduce_cli.records import (
     CrossValidation,
     FloatArray,
     HeuristicValidation,
+    ModelChoice,
     Reduction,
     Selected,
 )
@@ -33,8 +39,8 @@ def select_model(
 ) -> Selected:
     """Return the model of the size that the config asks for, or the smallest model within the tolerances on both sets.
 
-    If no model keeps the tolerances, the nearest one is returned, with a note. With cross-validation, it is the
-    smallest model that the data cannot distinguish from the best.
+    If no model keeps the tolerances, the nearest one is returned, with a note. With cross-validation, the
+    model is the smallest one that is hardly worse than the best one and than all parameters.
 
     Args:
         section: Limits of the config.
@@ -53,7 +59,10 @@ def select_model(
         results = {section.heuristic: results[section.heuristic]}
     missed = ""
     if cross_validation is not None:
-        heuristic, row, reason = _choose_by_cross_validation(results, cross_validation)
+        parsimonious = section.cross_validation == "parsimonious"
+        heuristic, row, reason = _choose_by_cross_validation(
+            results, cross_validation, parsimonious=parsimonious
+        )
     elif section.n is not None:
         heuristic, row = _find_of_size(section.n, results)
         reason = f"{heuristic} with the {section.n} parameters that selected.n asks for."
@@ -73,30 +82,42 @@ def select_model(
 
 
 def _choose_by_cross_validation(
-    results: Mapping[str, HeuristicValidation], folds: Mapping[str, CrossValidation]
+    results: Mapping[str, HeuristicValidation],
+    folds: Mapping[str, CrossValidation],
+    *,
+    parsimonious: bool,
 ) -> tuple[str, int, str]:
-    """Return the smallest model within one standard error of the best one in cross-validation: its heuristic, its row
-    and a sentence that says why.
-    """
-    choice = choose_by_one_standard_error(folds)
+    """Return the model that a rule selects in cross-validation: its heuristic, its row and sentences that say why."""
+    bounded, small = choose_by_bounded_loss(folds), choose_by_one_standard_error(folds)
+    choice, other = (small, bounded) if parsimonious else (bounded, small)
     row = results[choice.heuristic].find_row(choice.n)
     assert row is not None  # only sizes of the heuristic itself are judged
-    own = folds[choice.heuristic]
-    best = min(folds.values(), key=lambda r: float(r.mean.min()))
-    least = int(best.mean.argmin())
-    n_folds = own.torque_error.shape[0]
-    if own is best and best.n[least] == choice.n:
-        beside = "the least of all, and no smaller model is within one standard error of it"
+    best = find_best(folds)
+    full = format_percent(float(folds[choice.heuristic].full_error.mean()))
+    n_folds = folds[choice.heuristic].torque_error.shape[0]
+    if choice == best:
+        beside = "This error is the smallest"
     else:
-        beside = (
-            f"within one standard error ({format_percent(best.standard_error[least])}) of the best, {format_percent(best.mean[least])} "
-            f"with n = {best.n[least]}"
-        )
+        beside = f"The smallest error is {_format_mean(folds, best)} (n = {best.n})"
+    rule = (
+        "It is the smallest model within one standard error of the best"
+        if parsimonious
+        else f"No smaller model is certain to be at most {100 * LARGEST_LOSS:g} % worse than both"
+    )
     reason = (
         f"{choice.heuristic} with n = {choice.n}: with each of {n_folds} parts left out in turn its torque error "
-        f"there is {format_percent(float(own.mean[own.n == choice.n][0]))}, {beside}."
+        f"there is {_format_mean(folds, choice)}. {beside}; that of all parameters is {full}. {rule}."
     )
+    if other.n != choice.n:
+        key = "true" if parsimonious else "parsimonious"
+        reason += f" selected.cross_validation: {key} would select n = {other.n} ({_format_mean(folds, other)})."
     return choice.heuristic, row, reason
+
+
+def _format_mean(folds: Mapping[str, CrossValidation], choice: ModelChoice) -> str:
+    """Return the mean error of a model over the folds as text."""
+    result = folds[choice.heuristic]
+    return format_percent(float(result.mean[result.n == choice.n][0]))
 
 
 def _find_of_size(n: int, results: Mapping[str, HeuristicValidation]) -> Pick:

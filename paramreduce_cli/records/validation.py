@@ -108,6 +108,8 @@ class CrossValidation(BySize):
 
     torque_error: FloatArray
     """(n_folds, m)"""
+    full_error: FloatArray
+    """Errors of all parameters, (n_folds,)."""
 
     @property
     def mean(self) -> FloatArray:

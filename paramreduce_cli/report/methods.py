@@ -174,7 +174,7 @@ def _write_selection(data: ReportData) -> Iterator[str]:
             f"error for {proofs.n_proven} of {proofs.n_provable} sizes up to the rank."
         )
     if data.validation.cross_validation:
-        yield "The size was chosen by cross-validation inside the estimation set with the one-standard-error rule [Hastie2009]."
+        yield "The size was chosen by cross-validation inside the estimation set [Hastie2009], Sec. 7.10."
 
 
 def _write_result(data: ReportData) -> Iterator[str]:

@@ -14,7 +14,7 @@ _OVER_BEST = 4.0
 @placed(PageSection.IDENTIFICATION, 1)
 def cross_validation(data: ReportData) -> Figure | None:
     """Torque error against the number of parameters: on the training data, in cross-validation (with one standard
-    error) and held out. The dotted line is the error that noise alone would leave.
+    error) and held out. Dotted: all parameters, with parts left out. Dashed: the error that noise alone would leave.
     """
     crossed = data.validation.cross_validation
     if crossed is None:
@@ -29,9 +29,7 @@ def cross_validation(data: ReportData) -> Figure | None:
         label="parts left out in turn",
     )  # fmt: skip
     axes.plot(result.n, 100 * result.torque_error.validation, color="#d9730d", label="held out")
-    k = int(own.mean.argmin())
-    limit = 100 * float(own.mean[k] + own.standard_error[k])
-    axes.axhline(limit, color="#0b62c4", linewidth=0.8, linestyle=":")
+    axes.axhline(100 * float(own.full_error.mean()), color="#0b62c4", linewidth=0.8, linestyle=":")
     floor = (
         0.0 if data.log is None else estimate_noise_floor(data.log, data.reduction.nominal_torque)
     )
