@@ -27,6 +27,8 @@ class NumberTable(NamedTuple):
     """(n_rows, n_columns)"""
     left_out: list[str]
     """Headings of columns that hold text."""
+    first_line: int
+    """Line of the first row in the file: 1 without headings."""
 
 
 def read_csv(path: Path, *, leave_out_text: bool = False) -> NumberTable:
@@ -38,7 +40,7 @@ def read_csv(path: Path, *, leave_out_text: bool = False) -> NumberTable:
     Args:
         path: The file.
         leave_out_text: Whether columns that hold text in the first row are left out; empty cells are not a number
-            then. Otherwise both are errors.
+            then, and columns without headings have their numbers from 1 as names. Otherwise all of this is an error.
 
     Raises:
         DataError: The file is no table of numbers, or two headings are equal.
@@ -55,15 +57,22 @@ def read_csv(path: Path, *, leave_out_text: bool = False) -> NumberTable:
             lines: Iterator[str] = itertools.chain([first.lstrip("# ")], file)
             if delimiter == " ":
                 lines = (line.strip() + "\n" for line in lines)
-            rows = csv.reader(lines, delimiter=delimiter, skipinitialspace=delimiter == " ")
+            reader = csv.reader(lines, delimiter=delimiter, skipinitialspace=delimiter == " ")
+            rows: Iterator[list[str]] = reader
             header = [name.strip().strip('"').strip() for name in next(rows, [])]
-            _check_header(path, header)
+            first_line = 2
+            if leave_out_text and len(header) > 1 and all(map(_is_number, header)):
+                rows = itertools.chain([header], reader)
+                header = [str(k) for k in range(1, len(header) + 1)]
+                first_line = 1
+            else:
+                _check_header(path, header)
             kept = list(range(len(header)))
             begun_empty: set[int] = set()
             blank = None
             for row in rows:
                 if not row:
-                    blank = blank or rows.line_num
+                    blank = blank or reader.line_num
                     continue
                 if (
                     blank is not None
@@ -75,18 +84,19 @@ def read_csv(path: Path, *, leave_out_text: bool = False) -> NumberTable:
                     kept = [k for k in kept if header[k]]
                 if len(row) != len(header):
                     raise DataError(
-                        f"{path}, line {rows.line_num}: {len(row)} values under {len(header)} "
+                        f"{path}, line {reader.line_num}: {len(row)} values under {len(header)} "
                         "headings."
                     )
                 table.extend(
                     _number(
-                        path, rows.line_num, header[k], row[k],
+                        path, reader.line_num, header[k], row[k],
                         empty=leave_out_text, text=k in begun_empty,
                     )
                     for k in kept
                 )  # fmt: skip
             left_out = [name for k, name in enumerate(header) if name and k not in kept]
-            return NumberTable([header[k] for k in kept], table.to_matrix(len(kept)), left_out)
+            numbers = table.to_matrix(len(kept))
+            return NumberTable([header[k] for k in kept], numbers, left_out, first_line)
     except FileNotFoundError as error:
         raise make_missing_error(path) from error
     except (OSError, EOFError, zlib.error, UnicodeDecodeError, csv.Error) as error:

@@ -153,7 +153,7 @@ def _read_csv_arrays(path: Path, n_dof: int) -> dict[str, FloatArray]:
     Raises:
         DataError: A column is missing, or there are columns of more joints than the robot has.
     """
-    header, data, _ = read_csv(path)
+    header, data, *_ = read_csv(path)
     columns = {name: data[:, k] for k, name in enumerate(header)}
     arrays: dict[str, FloatArray] = {}
     for key in ("z", "dz", "ddz", "tau"):

@@ -4,6 +4,7 @@ import itertools
 import re
 from collections.abc import Collection, Mapping, Sequence
 
+from paramreduce_cli.config.column_headings import split_unit
 from paramreduce_cli.config.log_settings import NUMBER
 from paramreduce_cli.errors import ConfigError
 
@@ -12,10 +13,15 @@ _WORDS = {
     "velocity": ("dq", "qd", "qdot", "v", "vel", "velocity", "velocities", "dz", "actual_qd", "omega"),
     "acceleration": ("ddq", "qdd", "qddot", "acc", "acceleration", "accelerations", "ddz"),
     "torque": (
-        "tau", "torque", "torques", "effort", "efforts", "moment", "taum", "actual_current", "current", "i",
+        "tau", "torque", "torques", "effort", "efforts", "eff", "moment", "taum", "tau_j", "trq", "actual_current", "current",
+        "currents", "i",
     ),
 }  # fmt: skip
+_CURRENTS = ("actual_current", "current", "currents", "i")
+"""Words of torques that were recorded as currents."""
 _TIMES = ("t", "time", "timestamp", "stamp", "time_s", "seconds")
+_BEFORE_NUMBER = ("joint", "j", "axis", "motor", "m", "actuator", "link")
+"""Words before the number of a joint, where the quantity comes after it."""
 _WANTED_ONLY = ("command", "desired", "target", "ref", "setpoint")
 """Parts of names of what was asked of the machine, not measured."""
 _NEEDED = ("position", "torque")
@@ -29,39 +35,87 @@ _BY_HAND = "Take a config without --log, and write sampling.log with lists of co
 def guess_columns(names: Sequence[str], joints: Sequence[str]) -> dict[str, str | list[str]]:
     """Choose the columns of time, positions, speeds, accelerations and torques.
 
-    Joints are numbered from 0 or 1, or their names are part of the columns' names. Speeds and accelerations are
-    optional.
-
     Args:
-        names: Names of all columns.
+        names: Names of all columns, perhaps with units in brackets.
         joints: Names of the coordinates.
 
     Returns:
         By quantity a pattern such as ``q{}``, or a list with a column for each joint.
 
     Raises:
-        ConfigError: Time, positions or torques have no usual name, or several columns fit one joint.
+        ConfigError: Time, positions or torques have no usual name, several columns fit one joint, or there are columns
+            of more joints.
     """
-    times = [name for name in names if _normalise(name) in _TIMES]
-    times += [name for name in names if _normalise(name.rpartition("/")[2]) in _TIMES]
+    found = match_columns(names, joints)
+    missing = [key for key in (*_NEEDED, "time") if key not in found]
+    if missing:
+        raise ConfigError(
+            f"no columns for {' and '.join(missing)} of {len(joints)} joints ({', '.join(joints[:_MOST_JOINTS])}) by a usual name among {', '.join(names[:30])}. {suggest_locking(names, joints)}"
+        )
+    return found
+
+
+def match_columns(names: Sequence[str], joints: Sequence[str]) -> dict[str, str | list[str]]:
+    """Return the columns of those quantities that are recognised, like :func:`guess_columns`.
+
+    Joints are numbered from 0 or 1, or their names are part of the columns' names. A robot of one joint may have columns
+    without a number.
+
+    Args:
+        names: Names of all columns, perhaps with units in brackets.
+        joints: Names of the coordinates.
+
+    Raises:
+        ConfigError: Several columns fit one joint, or there are columns of more joints.
+    """
+    originals = {split_unit(name)[0]: name for name in reversed(names)}
+    plain = [split_unit(name)[0] for name in names]
     found: dict[str, str | list[str]] = {}
     for key, words in _WORDS.items():
-        columns = _match_numbered(names, words, len(joints)) or match_joint_names(
-            names, words, joints
+        columns = _match_numbered(plain, words, len(joints)) or match_joint_names(
+            plain, words, joints
         )
+        if columns is None and len(joints) == 1:
+            columns = (
+                _keep_likeliest([n for n in plain if _normalise(n) in words], words)[:1] or None
+            )
         if columns is not None:
             found[key] = columns
-    more = _count_surplus_joints(names, len(joints))
-    if more and not match_joint_names(names, _WORDS["position"], joints):
+    more = _count_surplus_joints(plain, len(joints))
+    if more and not match_joint_names(plain, _WORDS["position"], joints):
         raise ConfigError(
             f"the log has {more} joints by its columns, the robot {len(joints)} ({', '.join(joints[:_MOST_JOINTS])}). If it is a log of this robot: {_BY_HAND[0].lower()}{_BY_HAND[1:]}"
         )
-    missing = [key for key in _NEEDED if key not in found] + ([] if times else ["time"])
-    if missing:
-        raise ConfigError(
-            f"no columns for {' and '.join(missing)} of {len(joints)} joints ({', '.join(joints[:_MOST_JOINTS])}) by a usual name among {', '.join(names[:30])}. {_suggest_locking(names, joints)}"
-        )
-    return {"time": _choose_time(times, found["position"]), **found}
+    times = [name for name in plain if _normalise(name) in _TIMES]
+    times += [name for name in plain if _normalise(name.rpartition("/")[2]) in _TIMES]
+    if times:
+        positions = found.get("position", times[0])
+        found = {"time": _choose_time(times, positions), **found}
+    return {key: _restore_units(value, originals, len(joints)) for key, value in found.items()}
+
+
+def _restore_units(
+    columns: str | list[str], originals: Mapping[str, str], n: int
+) -> str | list[str]:
+    """Return columns by their headings with units: a pattern if all of them have the same unit, else a list."""
+    if isinstance(columns, list):
+        return [originals[name] for name in columns]
+    if NUMBER not in columns:
+        return originals[columns]
+    listed = [originals[columns.replace(NUMBER, str(j + 1))] for j in range(n)]
+    ends = {name[len(split_unit(name)[0]) :] for name in listed}
+    return f"{columns}{ends.pop()}" if len(ends) == 1 else listed
+
+
+def hold_currents(columns: str | Sequence[str]) -> bool:
+    """Return whether columns of torques are currents by their names or units."""
+    listed = [columns] if isinstance(columns, str) else columns
+    plain = [split_unit(name) for name in listed]
+    by_unit = any(unit.lower() in ("a", "ma") for _, unit in plain)
+    return by_unit or all(
+        any(_is_word(part, (word,)) for part in _split_at_number(name) for word in _CURRENTS)
+        for name, _ in plain
+    )
 
 
 def list_named_joints(names: Sequence[str]) -> list[str]:
@@ -87,7 +141,7 @@ def _count_surplus_joints(names: Sequence[str], n: int) -> int:
     return most if most > n else 0
 
 
-def _suggest_locking(names: Sequence[str], joints: Sequence[str]) -> str:
+def suggest_locking(names: Sequence[str], joints: Sequence[str]) -> str:
     """Return what to do about joints without columns: lock those beyond the joints that the log has."""
     by_hand = "Write sampling.log.columns by hand"
     most = [_count_joints(names, _WORDS[key], len(joints)) for key in _NEEDED]
@@ -115,7 +169,7 @@ def _count_common_characters(first: str, other: str) -> int:
 
 
 def _normalise(name: str) -> str:
-    return name.strip().strip("/").lower()
+    return name.strip().strip("/_").lower()
 
 
 def _match_numbered(names: Sequence[str], words: Sequence[str], n: int) -> str | list[str] | None:
@@ -123,20 +177,45 @@ def _match_numbered(names: Sequence[str], words: Sequence[str], n: int) -> str |
     columns fit.
     """
     known = set(names)
-    stems = {match[1] for name in names if (match := re.fullmatch(r"(.*?)\[?(\d+)\]?", name))}
-    for stem in sorted(stems, key=lambda stem: (_rank_stem(stem, words), stem)):
-        if _rank_stem(stem, words) == _UNLIKE:
+    forms = {
+        f"{name[: match.start()]}{NUMBER}{name[match.end() :]}"
+        for name in names
+        for match in re.finditer(r"\d+", name)
+    }
+    for form in sorted(forms, key=lambda form: (_rank_form(form, words), form)):
+        if _rank_form(form, words) == _UNLIKE:
             continue
-        for form in (f"{stem}{NUMBER}", f"{stem}[{NUMBER}]"):
-            if all(form.replace(NUMBER, str(j + 1)) in known for j in range(n)):
-                return form
-            listed = [form.replace(NUMBER, str(j)) for j in range(n)]
-            if all(name in known for name in listed):
-                return listed
+        if all(form.replace(NUMBER, str(j + 1)) in known for j in range(n)):
+            return form
+        listed = [form.replace(NUMBER, str(j)) for j in range(n)]
+        if all(name in known for name in listed):
+            return listed
     return None
 
 
 _UNLIKE = 1000
+
+
+def _rank_form(form: str, words: Sequence[str]) -> int:
+    """Return how likely a form such as ``q{}`` or ``joint{}_pos`` is of a quantity: earlier words are likelier, and
+    commanded values come last.
+    """
+    stem, end = form.split(NUMBER)
+    if end.strip("]") == "":
+        return _rank_stem(stem.removesuffix("["), words)
+    if not _is_word(stem, _BEFORE_NUMBER):
+        return _UNLIKE
+    return _rank_stem(end.lstrip("]_./ "), words)
+
+
+def _split_at_number(name: str) -> list[str]:
+    """Return the parts of a name before and after the number of its joint, or the placeholder of the number."""
+    return [part for part in re.split(r"\{\}|\d+", name) if part.strip("[]_./ ")]
+
+
+def _is_word(text: str, words: Sequence[str]) -> bool:
+    """Return whether the last part of a name, without marks at its ends, is one of the words."""
+    return _rank_stem(text.strip("[]_./ "), words) != _UNLIKE
 
 
 def _rank_stem(stem: str, words: Sequence[str]) -> int:

@@ -412,9 +412,10 @@ def _resolve_paths(config: Config, folder: Path) -> Config:
 
     sampling = resolve(config.sampling, "estimation_file", "validation_file", "test_file")
     if sampling.log is not None:
-        files: dict[str, list[Path]] = {"files": [folder / path for path in sampling.log.files]}
-        if others := sampling.log.held_out_files:
-            files["held_out"] = [folder / path for path in others]
+        log = sampling.log
+        files = {"files": [[folder / path for path in parts] for parts in log.training_files]}
+        if others := log.held_out_files:
+            files["held_out"] = [[folder / path for path in parts] for parts in others]
         log = sampling.log.model_copy(update=files)
         sampling = sampling.model_copy(update={"log": log})
     return config.model_copy(

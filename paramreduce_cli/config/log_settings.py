@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -12,14 +13,25 @@ from paramreduce_cli.fields.numbers import Number, Whole
 from paramreduce_cli.fields.section import PerJoint, Positive, Section
 from paramreduce_cli.records import FloatArray
 
+TODO = "TODO"
+"""Stands for a column that the user has to name."""
 NUMBER = "{}"
 """Stands for the number of the joint in names of columns."""
 
-Names = str | list[str]
-"""One name with ``{}`` for the joint's number, or a name for every joint."""
+
+def _name_numbers(value: object) -> object:
+    """Return columns that are given by their numbers as names; other values unchanged."""
+    if isinstance(value, list):
+        return [_name_numbers(entry) for entry in value]
+    return str(value) if isinstance(value, int) and not isinstance(value, bool) else value
+
+
+Name = Annotated[str, BeforeValidator(_name_numbers)]
+Names = Annotated[str | list[str], BeforeValidator(_name_numbers)]
+"""One name with ``{}`` for the joint's number, or a name for every joint; a file without headings has numbers from 1."""
 Frequency = Positive | Literal["auto", "none"]
 Files = Annotated[
-    list[Path],
+    list[Path | Annotated[list[Path], Field(min_length=1)]],
     BeforeValidator(lambda value: value if isinstance(value, list) else [value]),
     Field(min_length=1),
 ]
@@ -34,7 +46,7 @@ TIMES = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 class ColumnsSection(Section):
     """The names of columns, datasets or topics in a log, with `{}` for the joint's number, or one name for each joint."""
 
-    time: str = "t"
+    time: Name = "t"
     """Time."""
     position: Names = "q{}"
     """Positions."""
@@ -77,15 +89,15 @@ class LogSection(Section):
     """
 
     files: Files
-    """CSV (also .gz), HDF5, NPZ, or ROS 2 bags; relative to this file. Where held_out names files all of these are learned from."""
-    held_out: (
-        Annotated[Number, Field(ge=0.05, le=0.9)] | Annotated[list[Path], Field(min_length=1)]
-    ) = 0.4
+    """Text tables (also .gz), HDF5, NPZ, NPY, MATLAB files or ROS bags; relative to this file. A list among these are the files of one recording, which are joined by their times. Where held_out names files all of these are learned from."""
+    held_out: Annotated[Number, Field(ge=0.05, le=0.9)] | Files = 0.4
     """Held-out data: a fraction of every file, at its end, or a list of other files."""
     columns: ColumnsSection = ColumnsSection()
     """Columns that hold each quantity."""
     units: UnitsSection = UnitsSection()
     """Units of the columns."""
+    recorded_rate: Positive | None = None
+    """Rows per second of files without times; the column of times is not read then."""
     transmission: list[PerJoint] | PerJoint | None = None
     """Motor over joint: one number per joint, or a matrix N of them (motor position = N joint position); recorded positions and torques are then the motors'."""
     torque_constants: PerJoint | None = None
@@ -138,9 +150,14 @@ class LogSection(Section):
         return 0.0 if isinstance(self.held_out, list) else self.held_out
 
     @property
-    def held_out_files(self) -> list[Path]:
-        """Files that are held out; none where it is a share of each."""
-        return self.held_out if isinstance(self.held_out, list) else []
+    def training_files(self) -> list[list[Path]]:
+        """Files of each recording that is learned from."""
+        return _list_parts(self.files)
+
+    @property
+    def held_out_files(self) -> list[list[Path]]:
+        """Files of each recording that is held out; none where it is a share of each."""
+        return _list_parts(self.held_out) if isinstance(self.held_out, list) else []
 
     def compute_motor_matrix(self, n_dof: int) -> FloatArray | None:
         """Return the motor positions per joint position, (n_dof, n_dof), or None if joints were recorded.
@@ -163,3 +180,8 @@ class LogSection(Section):
         if np.linalg.cond(matrix) > 1e9:
             raise ValueError("has no inverse")
         return matrix
+
+
+def _list_parts(entries: Iterable[Path | list[Path]]) -> list[list[Path]]:
+    """Return the files of each recording, most often one."""
+    return [entry if isinstance(entry, list) else [entry] for entry in entries]

@@ -21,13 +21,19 @@ from paramreduce_cli.identification.log_signals import (
 )
 from paramreduce_cli.identification.outliers import replace_outliers
 from paramreduce_cli.identification.position_jumps import find_position_jumps, name_rows
-from paramreduce_cli.identification.signals import Signals, read_signals, resample_evenly
+from paramreduce_cli.identification.signals import (
+    Signals,
+    change_rate,
+    read_signals,
+    resample_evenly,
+)
 from paramreduce_cli.identification.state_estimation import (
     Cutoffs,
     choose_decimation,
     estimate_states,
 )
 from paramreduce_cli.records import (
+    BoolArray,
     CutoffSearch,
     FloatArray,
     IntArray,
@@ -93,13 +99,8 @@ def process_logs(
     steps: list[str] = []
     begin(0)
     files = _read_files(logs.training, section, names, unmeasured, steps)
-    others = _read_files(logs.held_out, section, names, unmeasured, steps)
+    others = _read_files(logs.held_out, section, names, unmeasured, steps, files.rate)
     training, held_out, rate = files.motions, others.motions, files.rate
-    if held_out and abs(others.rate - rate) > _SAME_RATE * rate:
-        raise DataError(
-            f"{others.sources[0]}: is recorded at {others.rate:.6g} Hz, {files.sources[0]} at "
-            f"{rate:.6g} Hz. Use logs of one rate."
-        )
     recorded = [piece for pieces in (*training, *held_out) for piece in pieces]
     warnings = dict.fromkeys(
         [
@@ -190,19 +191,30 @@ def _read_files(
     names: Sequence[str],
     unmeasured: Collection[str],
     steps: list[str],
+    rate: float = 0.0,
 ) -> _Files:
     """Return the signals of log files, with jumps cut out, outliers replaced and even time steps.
 
+    Args:
+        logs: Logs as recorded.
+        section: Settings of the section for logs.
+        names: Names of the coordinates.
+        unmeasured: Coordinates without torques.
+        steps: List to which a sentence on each step is added.
+        rate: Samples per second that all files are resampled to; zero for the rate of the first one.
+
     Raises:
-        DataError: A file is unusable, as the message says with its name, or has another rate than the first one.
+        DataError: A file is unusable, as the message says with its name.
     """
-    files = _Files()
+    files = _Files(rate=rate)
     for log in logs:
         source = log.source
         recorded = read_signals(log, section, names, unmeasured)
         rows, first_line = recorded.time.size, log.first_line
         del log  # the next one is read while this name would hold it
         try:
+            recorded, missing = _cut_out_missing_torques(recorded, first_line)
+            files.warnings += [f"{source}: {text}" for text in missing]
             recorded, parted, jumps = _cut_out_jumps(recorded, section, names, first_line)
             files.warnings += [f"{source}: {text}" for text in jumps]
             if section.delay:
@@ -215,15 +227,38 @@ def _read_files(
         steps += messages
         outliers = replace_outliers(pieces) if section.outliers == "replace" else {}
         steps += _describe_outliers(outliers, names)
-        if files.rate and abs(rate - files.rate) > _SAME_RATE * files.rate:
-            raise DataError(
-                f"{source}: is recorded at {rate:.6g} Hz, {files.sources[0]} at {files.rate:.6g} Hz. Use logs of one rate."
-            )
         files.rate = files.rate or rate
+        if abs(rate - files.rate) > _SAME_RATE * files.rate:
+            pieces = [change_rate(piece, rate, files.rate) for piece in pieces]
+            steps.append(f"Resampled to {files.rate:.5g} Hz, the rate of the first file.")
         files.sources.append(source)
         files.outliers.append(outliers)
         files.motions.append(pieces)
     return files
+
+
+def _cut_out_missing_torques(
+    recorded: Signals, first_line: int | None
+) -> tuple[Signals, list[str]]:
+    """Return a recording without the rows in which a torque is no number, and a sentence if there were such rows.
+
+    Raises:
+        DataError: Hardly any row has all torques.
+    """
+    missing = np.array(np.isnan(recorded.tau).any(axis=1), dtype=bool)
+    count = int(np.count_nonzero(missing))
+    if not count:
+        return recorded, []
+    if missing.size - count < _FEWEST_USED:
+        raise DataError(
+            f"torques are missing in {count} of {missing.size} rows. Joints without torques belong under unmeasured."
+        )
+    where = name_rows(np.flatnonzero(missing), first_line)
+    text = (
+        f"torques are missing in {count} of {missing.size} rows ({where}); these rows are not used."
+    )
+    kept: BoolArray = ~missing
+    return recorded.slice_rows(kept), [text]
 
 
 def _cut_out_jumps(

@@ -13,12 +13,14 @@ from paramreduce_cli.config.log_settings import (
     NUMBER,
     SPEEDS,
     TIMES,
+    TODO,
     TORQUES,
     LogSection,
     Names,
 )
 from paramreduce_cli.errors import ConfigError, DataError
 from paramreduce_cli.fields.section import expand_per_joint
+from paramreduce_cli.identification import filters
 from paramreduce_cli.identification.encoder_wraps import unwrap_positions
 from paramreduce_cli.records import BoolArray, FloatArray, RawLog
 from paramreduce_cli.resources.scratch import allocate_matrix, stack_columns
@@ -33,6 +35,8 @@ _AT_ONCE = 10_000
 """Rows."""
 _LARGEST = 1e30
 """More than any signal in any unit, nanoseconds since 1970 included; powers of it can be computed with."""
+_ANTI_ALIAS = 0.4
+"""Cut-off of the low-pass before a lower rate, a share of that rate."""
 _MOST_SHOWN = 12
 """Names of columns in a message."""
 
@@ -54,7 +58,7 @@ class Signals:
         """Return the signals at some samples."""
         dz = None if self.dz is None else self.dz[rows]
         ddz = None if self.ddz is None else self.ddz[rows]
-        return Signals(self.time[rows], self.z[rows], dz, ddz, self.tau[rows])
+        return Signals(self.time[rows], self.z[rows], dz, ddz, self.tau[rows], self.turns)
 
     def get_joint(self, j: int) -> "Signals":
         """Return the signals of one joint, (n_samples, 1) each."""
@@ -79,7 +83,10 @@ def read_signals(
         ConfigError: Signs, gears and the like do not fit the robot.
     """
     columns, units = section.columns, section.units
-    time = _read_column(log, columns.time) * TIMES[units.time]
+    recorded_rate = section.recorded_rate
+    time = None
+    if recorded_rate is None:
+        time = _read_column(log, columns.time) * TIMES[units.time]
 
     def read_quantity(key: str, factor: float) -> FloatArray | None:
         """Return the columns of a quantity in SI units, or None if the log lacks them."""
@@ -87,7 +94,8 @@ def read_signals(
         if where is None:
             return None
         left_out = unmeasured if key == "torque" else ()
-        values = _read_matrix(log, where, names, key, columns.time, left_out)
+        rows = None if time is None else (columns.time, time.size)
+        values = _read_matrix(log, where, names, key, rows, left_out)
         values *= factor
         return values
 
@@ -97,6 +105,8 @@ def read_signals(
     tau = read_quantity("torque", TORQUES[units.torque])
     assert z is not None
     assert tau is not None
+    if time is None:
+        time = np.arange(len(z)) / (recorded_rate or 1.0)
     _check_time(log, columns.time, time)
     turns = unwrap_positions(z) if section.outliers == "replace" else ()
     return _convert_to_joints(Signals(time, z, dz, ddz, tau, turns), section, len(names))
@@ -155,7 +165,7 @@ def _read_matrix(
     names: Names,
     joints: Sequence[str],
     key: str,
-    times: str,
+    rows: tuple[str, int] | None,
     left_out: Collection[str],
 ) -> FloatArray:
     """Return the columns of a quantity, (n_rows, n_dof); columns of joints that are left out are zero.
@@ -165,7 +175,7 @@ def _read_matrix(
         names: Names of the columns, or a pattern with ``{}`` for the number or ``{name}`` for the name of the joint.
         joints: Names of the joints.
         key: Key of the quantity under sampling.log.columns, for messages.
-        times: Name of the column of times, whose length the others must have.
+        rows: Name of the column of times and its number of rows, which the other columns must have; None without times.
         left_out: Joints without measurements, which need no column.
 
     Raises:
@@ -193,22 +203,26 @@ def _read_matrix(
                 f"names {len(names)} columns for {n_dof} joints.",
                 ("sampling", "log", "columns", key),
             )
-    reference = log.columns.get(times)
-    nothing = np.zeros(0 if reference is None else reference.size)
-    found = [
-        nothing if joint in left_out else _read_column(log, name)
-        for joint, name in zip(joints, listed, strict=True)
-    ]
-    for name, column in zip(listed, found, strict=True):
-        if reference is not None and column.size != reference.size:
+    known = {
+        joint: name for joint, name in zip(joints, listed, strict=True) if joint not in left_out
+    }
+    found = {
+        joint: _read_column(log, name, missing=key == "torque") for joint, name in known.items()
+    }
+    if rows is None:
+        first = next(iter(log.columns))
+        rows = first, log.columns[first].size
+    for joint, column in found.items():
+        name = known[joint]
+        if column.size != rows[1]:
             raise DataError(
-                f"{log.source}: column {name} has {column.size} rows, {times} has {reference.size}; use signals that were recorded together."
+                f"{log.source}: column {name} has {column.size} rows, {rows[0]} has {rows[1]}; use signals that were recorded together."
             )
-    return stack_columns(found)
+    return stack_columns([found.get(joint, np.zeros(rows[1])) for joint in joints])
 
 
-def _read_column(log: RawLog, name: str) -> FloatArray:
-    """Return a column of numbers.
+def _read_column(log: RawLog, name: str, *, missing: bool = False) -> FloatArray:
+    """Return a column of numbers; with ``missing`` some entries may be no numbers.
 
     Raises:
         DataError: The column is missing, too short, or holds entries that are no finite numbers.
@@ -216,6 +230,10 @@ def _read_column(log: RawLog, name: str) -> FloatArray:
     column = log.columns.get(name)
     if column is None and name in log.others:
         raise DataError(f"{log.source}: column {name} holds {log.others[name]}; use numbers.")
+    if name == TODO:
+        raise DataError(
+            f"{log.source}: a column is still {TODO}. Columns: {', '.join(log.columns)}."
+        )
     if column is None:
         known = list(log.columns)
         shown = ", ".join(known[:_MOST_SHOWN]) + (", ..." if len(known) > _MOST_SHOWN else "")
@@ -228,6 +246,8 @@ def _read_column(log: RawLog, name: str) -> FloatArray:
             f"{log.source}: column {name} holds no number at all. Leave it out of sampling.log.columns; speeds and "
             "accelerations are then made of the positions."
         )
+    if missing:
+        wrong = np.flatnonzero(np.abs(column) >= _LARGEST)
     if wrong.size:
         more = f", nor are {wrong.size - 1} others" if wrong.size > 1 else ""
         raise DataError(
@@ -294,6 +314,24 @@ def resample_evenly(
             "splines."
         )
     return kept, 1 / step, messages
+
+
+def change_rate(signals: Signals, rate: float, new_rate: float) -> Signals:
+    """Return signals at another rate, low-passed before if it is lower.
+
+    Args:
+        signals: Signals at an even rate.
+        rate: Samples per second of the signals.
+        new_rate: Samples per second of the result.
+    """
+    taps = filters.design_low_pass(_ANTI_ALIAS * new_rate, rate)
+
+    def apply(values: FloatArray | None) -> FloatArray | None:
+        return None if values is None else filters.apply_filter(values, taps)
+
+    z, tau = (filters.apply_filter(values, taps) for values in (signals.z, signals.tau))
+    low = Signals(signals.time, z, apply(signals.dz), apply(signals.ddz), tau, signals.turns)
+    return _resample(low, 1 / new_rate)
 
 
 def _resample(signals: Signals, step: float) -> Signals:

@@ -160,8 +160,15 @@ def list_user_files(config: Config | None, kind: type) -> dict[str, Path]:
         files = config.sampling.list_recordings()
     elif config is not None and kind is RawLogs and config.sampling.log is not None:
         log = config.sampling.log
-        files = {f"training {k}": path for k, path in enumerate(log.files)}
-        files |= {f"held out {k}": path for k, path in enumerate(log.held_out_files)}
+        files = {
+            f"{kind} {k}.{part}": path
+            for kind, recordings in (
+                ("training", log.training_files),
+                ("held out", log.held_out_files),
+            )
+            for k, paths in enumerate(recordings)
+            for part, path in enumerate(paths)
+        }
     return {name: path for name, path in files.items() if path is not None}
 
 

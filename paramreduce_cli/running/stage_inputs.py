@@ -6,7 +6,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from paramreduce_cli.artifacts.log_files import load_log
+from paramreduce_cli.artifacts.log_files import load_recorded
 from paramreduce_cli.artifacts.store import digest_file
 from paramreduce_cli.artifacts.user_files import load_coefficients, load_recording
 from paramreduce_cli.config import Config
@@ -82,25 +82,33 @@ def note_warnings() -> Iterator[list[str]]:
 class _LogFiles:
     """The logs of one kind, read one at a time when they are iterated over, as each may take gigabytes."""
 
-    def __init__(self, kind: str, paths: Sequence[Path], report_progress: ProgressCallback) -> None:
-        self._task, self._paths, self._tell = f"read {kind} logs", paths, report_progress
+    def __init__(
+        self,
+        kind: str,
+        recordings: Sequence[Sequence[Path]],
+        time: str,
+        report_progress: ProgressCallback,
+    ) -> None:
+        self._task, self._recordings, self._time = f"read {kind} logs", recordings, time
+        self._tell = report_progress
 
     def __iter__(self) -> Iterator[RawLog]:
-        for k, path in enumerate(self._paths):
-            self._tell(Progress(self._task, k, len(self._paths), path.name))
-            yield load_log(path)
-        if self._paths:
-            self._tell(Progress(self._task, len(self._paths), len(self._paths)))
+        for k, paths in enumerate(self._recordings):
+            self._tell(Progress(self._task, k, len(self._recordings), paths[0].name))
+            yield load_recorded(paths, self._time)
+        if self._recordings:
+            self._tell(Progress(self._task, len(self._recordings), len(self._recordings)))
 
 
 def _load_logs(inputs: Inputs) -> RawLogs:
     """Return the training and held-out logs that the config names; each file is read when it is iterated over."""
-    files = inputs.note_files(RawLogs)
+    inputs.note_files(RawLogs)
+    log = None if inputs.config is None else inputs.config.sampling.log
+    if log is None:
+        return RawLogs((), ())
     training, held_out = (
-        _LogFiles(
-            kind, [path for name, path in files.items() if name.startswith(kind)], inputs.tell
-        )
-        for kind in ("training", "held out")
+        _LogFiles(kind, recordings, log.columns.time, inputs.tell)
+        for kind, recordings in (("training", log.training_files), ("held out", log.held_out_files))
     )
     return RawLogs(training, held_out)
 

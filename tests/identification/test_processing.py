@@ -105,10 +105,37 @@ def test_held_out_files():
     assert any("by file" in step for step in found.steps)
 
 
-def test_another_rate_of_a_held_out_file_is_refused():
-    other = RawLog("other.csv", two_link_log(rate=100.0), 2)
-    with pytest.raises(DataError, match=r"other\.csv: is recorded at 100 Hz, log\.csv at 200 Hz"):
-        made(two_link_log(), other, held_out=["other.csv"])
+@pytest.mark.parametrize("rate", [100.0, 500.0])
+def test_a_file_of_another_rate_is_resampled(rate):
+    other = RawLog("other.csv", two_link_log(rate=rate), 2)
+    keys = {"held_out": ["other.csv"], "state_cutoff": "none", "torque_cutoff": "none"}
+    found = made(two_link_log(noise=0.0), other, **keys)
+    usual = made(two_link_log(noise=0.0), RawLog("other.csv", two_link_log(), 2), **keys)
+    assert "Resampled to 200 Hz, the rate of the first file." in found.steps
+    inner = slice(20, -20)
+    one, two = found.held_out, usual.held_out
+    assert np.diff(one.time) == pytest.approx(1 / 200)
+    at = np.searchsorted(two.time, one.time[inner] - 1e-6)
+    assert np.abs(one.z[inner] - two.z[at]).max() < 1e-4
+    assert np.abs(one.dz[inner] - two.dz[at]).max() < 1e-2
+
+
+def test_rows_without_torques_are_not_used():
+    log, clean = two_link_log(), two_link_log()
+    log["tau2"] = log["tau2"].copy()
+    log["tau2"][300:340] = np.nan
+    log["tau1"] = log["tau1"].copy()
+    log["tau1"][700] = np.nan
+    keys = {"state_cutoff": "none", "torque_cutoff": "none", "standstill": "keep"}
+    found, usual = made(log, **keys), made(clean, **keys)
+    (text,) = [text for text in found.warnings if "torques are missing in 41 of" in text]
+    assert "lines 302 to 341, 702" in text
+    assert np.isfinite(found.training.tau).all()
+    times = used(found.training)
+    assert not ((times > log["t"][300] - 1e-9) & (times < log["t"][339] + 1e-9)).any()
+    # A single row is no gap: it is interpolated like uneven time.
+    assert np.abs(times - log["t"][700]).min() < 1e-6
+    assert times.size > 0.9 * used(usual.training).size
 
 
 def test_standstill_is_cut_but_serves_filters():

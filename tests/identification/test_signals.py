@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from simulated_logs import two_link_log, write_log
 
-from paramreduce_cli.artifacts import log_files
+from paramreduce_cli.artifacts import array_files
 from paramreduce_cli.artifacts.log_files import load_log
 from paramreduce_cli.config.column_matching import guess_columns, list_named_joints
 from paramreduce_cli.config.log_settings import LogSection
@@ -230,7 +230,7 @@ def test_text_and_objects_that_nobody_asks_for(tmp_path):
 
 @pytest.mark.parametrize("save", [np.savez, np.savez_compressed])
 def test_arrays_of_all_kinds_of_numbers_and_orders(tmp_path, save, monkeypatch):
-    monkeypatch.setattr(log_files, "_AT_ONCE", 7)
+    monkeypatch.setattr(array_files, "_AT_ONCE", 7)
     rng = np.random.default_rng(0)
     q = rng.normal(size=(60, 3))
     brought = {
@@ -354,14 +354,17 @@ def test_cells_that_are_empty_are_missing_numbers_and_no_text(tmp_path):
     path.write_text("t,q1,mode,tau1\n" + "".join(f"{k},{k},run,{k or ''}\n" for k in range(60)))
     log = load_log(path)
     assert list(log.columns) == ["t", "q1", "tau1"]
-    with pytest.raises(DataError, match="line 2, column tau1: is empty or not a finite number"):
+    found = read_signals(log, LogSection(files=["x"], columns={"torque": "tau{}"}), ["a"])
+    assert np.flatnonzero(np.isnan(found.tau)).tolist() == [0]
+    log = RawLog("log.csv", {**log.columns, "q1": log.columns["tau1"]}, 2)
+    with pytest.raises(DataError, match="line 2, column q1: is empty or not a finite number"):
         read_signals(log, LogSection(files=["x"], columns={"torque": "tau{}"}), ["a"])
 
 
 @pytest.mark.parametrize(
     ("text", "says"),
     [
-        ("0.0,1.0,2.0\n1.0,2.0,3.0\n", "line 1: holds numbers where headings should be"),
+        ("0.0\n1.0\n", "line 1: holds numbers where headings should be"),
         ("t;q1\n0;1,5\n", "line 2, column q1: '1,5' is not a number. Write decimal points"),
     ],
 )
@@ -425,3 +428,95 @@ def test_a_column_of_one_joint_is_not_that_of_another():
     ]
     names = ["t", "arm/q", "arm/target_q", "arm/tau"]
     assert guess_columns(names, ["arm"])["position"] == ["arm/q"]
+
+
+def test_a_table_without_headings_has_columns_by_number(tmp_path):
+    rows = np.random.default_rng(0).normal(size=(60, 3)).round(6)
+    path = tmp_path / "log.csv"
+    path.write_text("\n".join(",".join(map(str, row)) for row in rows.tolist()) + "\n")
+    log = load_log(path)
+    assert list(log.columns) == ["1", "2", "3"]
+    assert log.describe_row(0).endswith("log.csv, line 1")
+    np.testing.assert_array_equal(np.column_stack(list(log.columns.values())), rows)
+    path.write_text("1,2\n3,x\n")
+    with pytest.raises(DataError, match="line 2, column 2: 'x' is not a number"):
+        load_log(path)
+
+
+def test_columns_by_number():
+    by_number = RawLog("x.csv", {str(k + 1): column for k, column in enumerate(LOG.values())}, 1)
+    columns = {"time": 1, "position": [2, 3], "velocity": [4, 5], "torque": [6, 7]}
+    found = read_signals(by_number, section(columns=columns), NAMES)
+    np.testing.assert_array_equal(found.tau[:, 1], LOG["tau2"])
+
+
+def test_a_rate_instead_of_times():
+    log = RawLog("x.csv", {name: values for name, values in LOG.items() if name != "t"}, 2)
+    found = read_signals(log, section(recorded_rate=200), NAMES)
+    np.testing.assert_allclose(found.time, LOG["t"], atol=1e-12)
+    with pytest.raises(DataError, match="there is no column t"):
+        read_signals(log, section(), NAMES)
+
+
+def as_npy(path):
+    np.save(path, np.column_stack(list(LOG.values())))
+
+
+def as_mat(path):
+    import scipy.io
+
+    q, tau = (np.column_stack([LOG[f"{key}1"], LOG[f"{key}2"]]) for key in ("q", "tau"))
+    scipy.io.savemat(path, {"run": {"t": LOG["t"], "q": q, "tau": tau, "note": "warm"}})
+
+
+def as_mat73(path):
+    q, tau = (np.array([LOG[f"{key}1"], LOG[f"{key}2"]]) for key in ("q", "tau"))
+    with h5py.File(path, "w") as file:  # MATLAB stores columns first
+        file["run/t"], file["run/q"], file["run/tau"] = LOG["t"][None], q, tau
+
+
+@pytest.mark.parametrize(
+    ("name", "write", "column"),
+    [("log.npy", as_npy, "2"), ("log.mat", as_mat, "run/q1"), ("log.mat", as_mat73, "run/q1")],
+)
+def test_arrays_of_other_programs(name, write, column, tmp_path):
+    write(tmp_path / name)
+    np.testing.assert_array_equal(load_log(tmp_path / name).columns[column], LOG["q1"])
+
+
+@pytest.mark.parametrize("name", ["log.npy", "log.mat"])
+def test_damaged_arrays_are_refused(name, tmp_path):
+    (tmp_path / name).write_bytes(b"nothing of the kind")
+    with pytest.raises(ArtifactError, match="cannot be read as"):
+        load_log(tmp_path / name)
+    with pytest.raises(ArtifactError):
+        load_log(tmp_path / f"missing_{name}")
+
+
+@pytest.mark.parametrize("name", ["log.xlsx", "log.parquet", "log.ulg"])
+def test_files_that_are_not_read_are_answered_with_how_to_convert(name, tmp_path):
+    (tmp_path / name).write_bytes(b"PK")
+    with pytest.raises(ArtifactError, match="such files are not read") as caught:
+        load_log(tmp_path / name)
+    assert re.search("CSV|ulog2csv", caught.value.remedy)
+
+
+def test_a_ros_1_bag(tmp_path):
+    rosbag1 = pytest.importorskip("rosbags.rosbag1")
+    from rosbags.typesys import Stores, get_typestore
+
+    store = get_typestore(Stores.ROS1_NOETIC)
+    kind = "sensor_msgs/msg/JointState"
+    time, header = (
+        store.types[f"{name}"] for name in ("builtin_interfaces/msg/Time", "std_msgs/msg/Header")
+    )
+    with rosbag1.Writer(tmp_path / "log.bag") as writer:
+        connection = writer.add_connection("/joint_states", kind, typestore=store)
+        for k in range(5):
+            values = [np.array([0.1 * k, 0.2 * k]) for _ in range(3)]
+            stamp = header(k, time(10 + k, 0), "base")
+            message = store.types[kind](stamp, ["upper", "fore"], *values)
+            writer.write(connection, k * 10**9, store.serialize_ros1(message, kind))
+    found = load_log(tmp_path / "log.bag").columns
+    np.testing.assert_allclose(found["/joint_states/position/fore"], 0.2 * np.arange(5))
+    np.testing.assert_allclose(found["/joint_states/time"], np.arange(5))

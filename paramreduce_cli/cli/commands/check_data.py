@@ -37,7 +37,7 @@ def check_data(file: Path, config: Path | None, overrides: tuple[str, ...]) -> N
     Columns are those of the config's log; without a log in a config they are found by their usual names.
     """
     # Late: these load all numerics.
-    from paramreduce_cli.artifacts.log_files import load_log
+    from paramreduce_cli.artifacts.log_files import load_log, load_recorded
     from paramreduce_cli.identification.cutoff_selection import make_column_function
     from paramreduce_cli.identification.processing import process_logs
     from paramreduce_cli.identification.quality import find_base, measure_quality
@@ -59,9 +59,14 @@ def check_data(file: Path, config: Path | None, overrides: tuple[str, ...]) -> N
     if section is None:
         columns = ColumnsSection(**guess_columns(names, joints))  # type: ignore[arg-type]
         section = LogSection(files=[file], columns=columns)
-    if file.resolve() in map(Path.resolve, section.files):
+    if file.resolve() in (part.resolve() for parts in section.training_files for part in parts):
         # The log of the config is processed as `run` processes it.
-        logs = RawLogs(map(load_log, section.files), map(load_log, section.held_out_files))
+        logs = RawLogs(
+            *(
+                [load_recorded(parts, section.columns.time) for parts in recordings]
+                for recordings in (section.training_files, section.held_out_files)
+            )
+        )
     elif section.held_out_files:
         usual = LogSection.model_fields["held_out"].default
         section = section.model_copy(update={"held_out": usual})

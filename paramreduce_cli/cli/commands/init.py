@@ -13,9 +13,11 @@ import click
 
 from paramreduce_cli.cli.example_command import ExampleCommand
 from paramreduce_cli.cli.terminal import say
-from paramreduce_cli.config.column_matching import guess_columns
+from paramreduce_cli.config.column_headings import read_units
+from paramreduce_cli.config.column_matching import match_columns, suggest_locking
 from paramreduce_cli.config.examples import copy_example, make_exists_error
 from paramreduce_cli.config.loading import load_config
+from paramreduce_cli.config.log_settings import TODO
 from paramreduce_cli.config.log_template import format_log_section
 from paramreduce_cli.config.schema import CLOSED, Config, SourceSection
 from paramreduce_cli.config.template import (
@@ -30,11 +32,14 @@ from paramreduce_cli.fields.section import NAME
 from paramreduce_cli.importing.config_writing import format_config
 from paramreduce_cli.importing.simplification import SimplifiedRobot
 from paramreduce_cli.importing.source_reading import find_described_robot, read_robot
+from paramreduce_cli.records import RawLog
 
 _BASE = 6
 """Coordinates of a base that floats, which come first."""
 _FARTHEST = 1e6
 """Where a joint may be locked, rad or m."""
+_MOST_SHOWN = 30
+"""Names of columns in a message."""
 
 
 @click.command(
@@ -138,7 +143,8 @@ def init(
             say(f"- {warning}.")
     if path.exists():
         raise make_exists_error(path)
-    _check_config(text)
+    # Numbers that the user has to fill in are taken for 1.
+    _check_config(re.sub(rf"(recorded_rate|torque_constants): {TODO}", r"\1: 1", text))
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(text, encoding="utf-8")
@@ -151,41 +157,77 @@ def init(
 def _make_log_section(
     config: Path, logs: Sequence[Path], joints: Sequence[str], base: Sequence[str]
 ) -> str:
-    """Return the section for logs, with columns by their usual names.
+    """Return the section for logs, with columns by their usual names; columns that are not recognised are marked TODO.
 
     Raises:
-        ConfigError: Positions or torques have none, of the joints or of a base that floats.
+        ConfigError: A file has no rows, several columns fit one joint, or a base that floats has no columns.
     """
     # Late: HDF5 and NumPy.
-    import numpy as np
-
     from paramreduce_cli.artifacts.log_files import load_log
 
-    log = load_log(logs[0])
-    recorded = log.columns
-    if not any(column.size for column in recorded.values()):
-        raise ConfigError(f"{logs[0]}: has headings, but no rows of numbers below.")
-    empty = [name for name, column in recorded.items() if not np.isfinite(column).any()]
-    if empty:
-        say(f"- {', '.join(empty)}: no numbers, left out.")
-    names = [name for name in recorded if name not in empty]
-    try:
-        columns = guess_columns(names, joints)
-    except ConfigError as error:
-        if not base and log.others:
-            held = " ".join(f"{name} holds {kind}." for name, kind in log.others.items())
-            raise ConfigError(f"{error} {held}") from error
-        if not base:
-            raise
-        guess_columns(names, joints[len(base) :])
+    parts = [load_log(path) for path in logs]
+    for path, part in zip(logs, parts, strict=True):
+        if not any(column.size for column in part.columns.values()):
+            raise ConfigError(f"{path}: has headings, but no rows of numbers below.")
+    names = _list_columns(parts[0])
+    columns = _match_columns(parts[0], names, joints)
+    joined = len(parts) > 1 and not {"position", "torque"} <= set(columns)
+    if joined:  # positions in one file, torques in another one
+        names = list(dict.fromkeys(name for part in parts for name in _list_columns(part)))
+        columns = match_columns(names, joints)
+    if (
+        base
+        and "position" not in columns
+        and "position" in match_columns(names, joints[len(base) :])
+    ):
         raise ConfigError(
             f"{logs[0]}: has columns for the joints, but none for the coordinates of the base ({', '.join(base)}). If it stood "
             "still, leave --floating out. If its motion was recorded under other names, leave --log out, and write sampling.log into the config."
-        ) from error
+        )
+    units = read_units(columns)
     for key, value in columns.items():
         shown = value if isinstance(value, str) else ", ".join(value)
-        say(f"- {key}: {shown}.")
-    return format_log_section([_make_path(config, path) for path in logs], columns)
+        say(f"- {key}: {shown}{f', in {units[key]}' if key in units else ''}.")
+    missing = [key for key in ("time", "position", "torque") if key not in columns]
+    if missing:
+        say(
+            f"- {', '.join(missing)}: not recognised among the columns {', '.join(names[:_MOST_SHOWN])}"
+            f"{', ...' if len(names) > _MOST_SHOWN else ''}, so marked TODO."
+        )
+    if missing and missing != ["time"]:
+        say(f"- {suggest_locking(names, joints)}")
+    for name, kind in parts[0].others.items() if missing else ():
+        say(f"- {name}: holds {kind}.")
+    paths = [_make_path(config, path) for path in logs]
+    return format_log_section([paths] if joined else paths, columns, units, names)
+
+
+def _list_columns(log: RawLog) -> list[str]:
+    """Return the names of the columns with numbers."""
+    import numpy as np
+
+    empty = [name for name, column in log.columns.items() if not np.isfinite(column).any()]
+    if empty:
+        say(f"- {', '.join(empty)}: no numbers, left out.")
+    return [name for name in log.columns if name not in empty]
+
+
+def _match_columns(
+    log: RawLog, names: Sequence[str], joints: Sequence[str]
+) -> dict[str, str | list[str]]:
+    """Return the columns by quantity as far as they are recognised: by their names, or without headings by their
+    numbers.
+    """
+    from paramreduce_cli.identification.column_order import guess_order
+
+    if len({name.rstrip("0123456789") for name in names}) != 1:
+        return match_columns(names, joints)
+    columns = guess_order({name: log.columns[name] for name in names}, len(joints))
+    if columns:
+        say(
+            f"- {log.source}: columns have no names, so they are taken by their order; check these."
+        )
+    return columns
 
 
 def _make_path(config: Path, file: Path) -> Path:

@@ -1,0 +1,81 @@
+"""Parts of one recording in several files, such as positions and torques, joined by their times."""
+
+from collections.abc import Sequence
+
+import numpy as np
+import scipy  # its interpolate takes a quarter of a second to load, so only when it is used
+
+from paramreduce_cli.errors import DataError
+from paramreduce_cli.records import FloatArray, RawLog
+
+_LEAST_COMMON = 0.5
+"""Share of the shortest part's duration in which all parts have to be recorded."""
+
+
+def join_logs(parts: Sequence[RawLog], time: str) -> RawLog:
+    """Return the columns of all parts at the times of the part with the most rows a second.
+
+    Columns of the other parts are interpolated by cubic splines; times at which a part is not recorded are left out.
+
+    Args:
+        parts: Parts of one recording, at least one.
+        time: Name of the column of times that each part has.
+
+    Raises:
+        DataError: A part has no times, times do not increase, two parts have a column of the same name, or they were
+            recorded at other times.
+    """
+    if len(parts) == 1:
+        return parts[0]
+    times = [_get_times(part, time) for part in parts]
+    first, last = max(t[0] for t in times), min(t[-1] for t in times)
+    if last - first < _LEAST_COMMON * min(t[-1] - t[0] for t in times):
+        spans = ", ".join(
+            f"{part.source} from {t[0]:.6g} to {t[-1]:.6g}"
+            for part, t in zip(parts, times, strict=True)
+        )
+        raise DataError(f"parts of one recording have hardly any time in common: {spans}.")
+    fastest = max(range(len(parts)), key=lambda k: times[k].size / (times[k][-1] - times[k][0]))
+    kept = (times[fastest] >= first) & (times[fastest] <= last)
+    at = times[fastest][kept]
+    columns: dict[str, FloatArray] = {time: at}
+    for k, (part, own) in enumerate(zip(parts, times, strict=True)):
+        for name, values in part.columns.items():
+            if name == time:
+                continue
+            if name in columns:
+                raise DataError(
+                    f"{part.source}: has a column {name} like another part of the recording. Rename one of them."
+                )
+            columns[name] = values[kept] if k == fastest else _interpolate(own, values, at)
+    others = {name: kind for part in parts for name, kind in part.others.items()}
+    sources = " + ".join(part.source for part in parts)
+    return RawLog(sources, columns, first_line=None, others=others)
+
+
+def _get_times(part: RawLog, time: str) -> FloatArray:
+    """Return the times of a part; raise DataError if it has none, or if they do not increase."""
+    times = part.columns.get(time)
+    if times is None or times.size < 2:
+        raise DataError(
+            f"{part.source}: there is no column {time}, which joins the parts of a recording. Columns: "
+            f"{', '.join(part.columns)}."
+        )
+    wrong = np.flatnonzero(~(np.diff(times) > 0))
+    if wrong.size:
+        where = part.describe_row(int(wrong[0]) + 1)
+        raise DataError(
+            f"{where}, column {time}: time does not increase, so parts cannot be joined."
+        )
+    return times
+
+
+def _interpolate(recorded_at: FloatArray, values: FloatArray, at: FloatArray) -> FloatArray:
+    """Return a column at other times; beside values that are not finite the result is not a number."""
+    finite = np.isfinite(values)
+    if np.count_nonzero(finite) < 2:
+        return np.full(at.size, np.nan)
+    result: FloatArray = scipy.interpolate.CubicSpline(recorded_at[finite], values[finite])(at)
+    near = np.interp(at, recorded_at, np.where(finite, 0.0, 1.0))
+    result[near > 0] = np.nan
+    return result
