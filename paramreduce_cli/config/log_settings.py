@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import BeforeValidator, Field, model_validator
+from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
 from paramreduce_cli.fields.numbers import Number, Whole
 from paramreduce_cli.fields.section import PerJoint, Positive, Section
@@ -26,8 +26,15 @@ def _name_numbers(value: object) -> object:
     return str(value) if isinstance(value, int) and not isinstance(value, bool) else value
 
 
+def _check_named(value: str | list[str]) -> str | list[str]:
+    """Raise ValueError if columns are still to be named."""
+    if value == TODO:
+        raise ValueError(f"is still {TODO}. Name the columns")
+    return value
+
+
 Name = Annotated[str, BeforeValidator(_name_numbers)]
-Names = Annotated[str | list[str], BeforeValidator(_name_numbers)]
+Names = Annotated[str | list[str], BeforeValidator(_name_numbers), AfterValidator(_check_named)]
 """One name with ``{}`` for the joint's number, or a name for every joint; a file without headings has numbers from 1."""
 Frequency = Positive | Literal["auto", "none"]
 Files = Annotated[

@@ -13,7 +13,6 @@ from paramreduce_cli.config.log_settings import (
     NUMBER,
     SPEEDS,
     TIMES,
-    TODO,
     TORQUES,
     LogSection,
     Names,
@@ -230,10 +229,6 @@ def _read_column(log: RawLog, name: str, *, missing: bool = False) -> FloatArray
     column = log.columns.get(name)
     if column is None and name in log.others:
         raise DataError(f"{log.source}: column {name} holds {log.others[name]}; use numbers.")
-    if name == TODO:
-        raise DataError(
-            f"{log.source}: a column is still {TODO}. Columns: {', '.join(log.columns)}."
-        )
     if column is None:
         known = list(log.columns)
         shown = ", ".join(known[:_MOST_SHOWN]) + (", ..." if len(known) > _MOST_SHOWN else "")

@@ -50,8 +50,9 @@ def test_columns_of_text_are_told_by_name(tmp_path, invoke):
         'iyy="1" iyz="0" izz="1"/></inertial></link><joint name="j" type="continuous"><parent link="b"/><child link="c"/>'
         '<axis xyz="0 0 1"/></joint></robot>'
     )
-    said = invoke("init", robot, "--log", path, "--output", tmp_path / "c.yaml", code=2).err
-    assert "t holds text. state holds text." in " ".join(said.split())
+    said = invoke("init", robot, "--log", path, "--output", tmp_path / "c.yaml").out
+    assert "- t: holds text." in said
+    assert "recorded_rate: TODO" in (tmp_path / "c.yaml").read_text()
     path.write_text("t,q1,tau1\n")
-    said = invoke("init", robot, "--log", path, "--output", tmp_path / "c.yaml", code=2).err
+    said = invoke("init", robot, "--log", path, "--output", tmp_path / "d.yaml", code=2).err
     assert "has headings, but no rows of numbers below" in " ".join(said.split())

@@ -13,6 +13,13 @@ from paramreduce_cli.artifacts.store import Store, load_file
 from paramreduce_cli.config import load_config
 from paramreduce_cli.records import Identification, Samples, Validation
 
+_LINK = '<link name="{}"><inertial><mass value="1"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial></link>'
+_JOINT = '<joint name="{}" type="continuous"><parent link="{}"/><child link="{}"/><axis xyz="0 1 0"/></joint>'
+TWO_JOINTS = (
+    '<robot name="arm"><link name="a"/>' + _LINK.format("b") + _LINK.format("c")
+    + _JOINT.format("upper", "a", "b") + _JOINT.format("fore", "b", "c") + "</robot>"
+)  # fmt: skip
+
 
 @pytest.fixture(scope="module")
 def identification(measured_results):
@@ -182,9 +189,32 @@ def test_columns_are_guessed(tmp_path, invoke):
 def test_joints_that_a_log_does_not_have_are_named(tmp_path, invoke):
     folder = ROOT / "configs/logs"
     log = ("init", folder / "panda.urdf", "--log", folder / "panda.csv.gz")
-    error = " ".join(invoke(*log, "--output", tmp_path / "p.yaml", code=2).err.split())
-    (lock,) = re.findall(r"The log has 7 joints: .* try (--lock \S+)\.", error)
-    invoke(*log, *lock.split(), "--output", tmp_path / "p.yaml")
+    said = " ".join(invoke(*log, "--output", tmp_path / "p.yaml").out.split())
+    assert 'position: "TODO"' in (tmp_path / "p.yaml").read_text()
+    (lock,) = re.findall(r"The log has 7 joints: .*? try (--lock \S+)\.", said)
+    invoke(*log, *lock.split(), "--output", tmp_path / "q.yaml")
+    assert "TODO" not in (tmp_path / "q.yaml").read_text().partition("sampling:")[2]
+
+
+def test_a_config_is_written_for_what_is_recognised(tmp_path, invoke, monkeypatch):
+    """Positions and currents of two files of one recording; what is missing is marked, and run says so."""
+    monkeypatch.chdir(tmp_path)
+    log = two_link_log()
+    write_log(tmp_path / "states.csv", {"t": log["t"], "q1": log["q1"], "q2": log["q2"]})
+    currents = {"t": log["t"][::2], "i1 [A]": log["tau1"][::2], "i2 [A]": log["tau2"][::2]}
+    write_log(tmp_path / "drives.csv", currents)
+    write_log(tmp_path / "odd.csv", {"q1": log["q1"], "q2": log["q2"], "foo": log["tau1"]})
+    (tmp_path / "arm.urdf").write_text(TWO_JOINTS)
+    invoke("init", "arm.urdf", "--log", "states.csv", "--log", "drives.csv", "--output", "a.yaml")
+    text = (tmp_path / "a.yaml").read_text()
+    assert 'files: [["states.csv", "drives.csv"]]' in text
+    assert "torque_constants: TODO" in text
+    error = invoke("process-log", "a.yaml", code=2).err
+    assert "sampling.log.torque_constants: 'TODO' is not a number" in " ".join(error.split())
+    said = invoke("init", "arm.urdf", "--log", "odd.csv", "--output", "b.yaml").out
+    assert "time, torque: not recognised among the columns q1, q2, foo" in " ".join(said.split())
+    error = invoke("process-log", "b.yaml", settings=["sampling.log.recorded_rate=200"], code=2).err
+    assert re.search(r"b.yaml, line \d+: sampling.log.columns.torque is still TODO", error)
 
 
 def test_a_log_that_is_absent_is_said_before_anything_is_done(tmp_path, invoke):

@@ -143,8 +143,9 @@ def init(
             say(f"- {warning}.")
     if path.exists():
         raise make_exists_error(path)
-    # Numbers that the user has to fill in are taken for 1.
-    _check_config(re.sub(rf"(recorded_rate|torque_constants): {TODO}", r"\1: 1", text))
+    # Columns that are still to be named are taken for some name, numbers for 1.
+    filled = text.replace(f'"{TODO}"', '"x"')
+    _check_config(re.sub(rf"(recorded_rate|torque_constants): {TODO}", r"\1: 1", filled))
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(text, encoding="utf-8")
@@ -170,11 +171,16 @@ def _make_log_section(
         if not any(column.size for column in part.columns.values()):
             raise ConfigError(f"{path}: has headings, but no rows of numbers below.")
     names = _list_columns(parts[0])
+    empty = [name for name in parts[0].columns if name not in names]
+    if empty:
+        say(f"- {', '.join(empty)}: no numbers, left out.")
     columns = _match_columns(parts[0], names, joints)
-    joined = len(parts) > 1 and not {"position", "torque"} <= set(columns)
-    if joined:  # positions in one file, torques in another one
-        names = list(dict.fromkeys(name for part in parts for name in _list_columns(part)))
-        columns = match_columns(names, joints)
+    every = list(dict.fromkeys(name for part in parts for name in _list_columns(part)))
+    # Positions may be in one file, torques in another one.
+    together = match_columns(every, joints) if len(parts) > 1 else columns
+    joined = set(together) > set(columns)
+    if joined:
+        names, columns = every, together
     if (
         base
         and "position" not in columns
@@ -206,10 +212,7 @@ def _list_columns(log: RawLog) -> list[str]:
     """Return the names of the columns with numbers."""
     import numpy as np
 
-    empty = [name for name, column in log.columns.items() if not np.isfinite(column).any()]
-    if empty:
-        say(f"- {', '.join(empty)}: no numbers, left out.")
-    return [name for name in log.columns if name not in empty]
+    return [name for name, column in log.columns.items() if np.isfinite(column).any()]
 
 
 def _match_columns(
