@@ -125,9 +125,9 @@ class LogSection(Section):
     outliers: Literal["replace", "keep"] = "replace"
     """`replace` adds whole turns that positions jump by, cuts out rows in which positions jump to and fro, and interpolates single torques and positions far from their neighbours; `keep` leaves all of them."""
     state_cutoff: Frequency = "auto"
-    """Cut-off frequency of the zero-phase low-pass on positions and speeds, Hz; auto takes it from the spectrum."""
+    """Cut-off frequency of the zero-phase low-pass on positions and speeds, Hz; auto chooses it by cross-validation."""
     torque_cutoff: Frequency = "auto"
-    """Torque cutoff of the zero-phase low-pass that torques and observation matrix share, Hz; auto is the frequency up to which there is motion, none leaves torques as recorded."""
+    """Torque cutoff of the zero-phase low-pass that torques and observation matrix share, Hz; auto is the end of the band that the model explains, none leaves torques as recorded."""
     rate: Positive | None = None
     """Samples per second that are used; if left out ten per period of the torque cut-off, or as recorded."""
     folds: Annotated[Whole, Field(ge=2, le=100)] = 5
