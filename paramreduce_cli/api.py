@@ -85,16 +85,17 @@ def load_config(path: Path | str, overrides: Sequence[str] = ()) -> Config:
     return loaded_config(Path(path), overrides)
 
 
-def build_model(config: Config) -> Model:
+def build_model(config: Config, log: MeasuredLog | None = None) -> Model:
     """Derive a robot's model, its parameters and its base parameters.
 
     Args:
         config: Config from :func:`load_config`.
+        log: Log from :func:`process_log`, which decides on friction that the config leaves to it (``friction: auto``).
 
     Raises:
         ParamreduceError: The config describes no mechanism that can be.
     """
-    return _run_stage(Model, config)
+    return _run_stage(Model, config, log)
 
 
 def optimize_trajectories(config: Config, model: Model, *, jobs: int = 1) -> Trajectories:
@@ -109,9 +110,9 @@ def optimize_trajectories(config: Config, model: Model, *, jobs: int = 1) -> Tra
     return _run_stage(Trajectories, config, model, jobs=jobs)
 
 
-def process_log(config: Config, model: Model) -> MeasuredLog:
+def process_log(config: Config) -> MeasuredLog:
     """Process the logs that ``sampling.log`` names: clean, filter, differentiate and split them."""
-    return _run_stage(MeasuredLog, config, model)
+    return _run_stage(MeasuredLog, config)
 
 
 def sample(

@@ -72,6 +72,12 @@ def _check_payloads_and_drives(config: Config) -> Iterator[Problem]:
         yield ("payloads", *key), message
     for key, message in drives.find_drive_problems(config.drives, bodies.list_coordinates()):
         yield ("drives", *key), message
+    for name, drive in config.drives.items():
+        if drive.friction == "auto" and config.sampling.log is None:
+            yield (
+                ("drives", name, "friction"),
+                "is auto, but there is no sampling.log to decide; give values or unknown",
+            )
 
 
 def _check_tracking(config: Config) -> Iterator[Problem]:
@@ -184,7 +190,7 @@ def _check_simulation(config: Config) -> Iterator[Problem]:
     if section.duration / section.step > _MOST_STEPS:
         yield (*path, "step"), f"makes more than {_MOST_STEPS} samples of {section.duration:g} s"
     for name, drive in config.list_drives().items():
-        if Kind.COULOMB in drive.get_values() and not drive.smoothing:
+        if {Kind.COULOMB, Kind.STRIBECK} & set(drive.get_values()) and not drive.smoothing:
             yield ("drives",), f"{name} needs a smoothing: a sign that jumps cannot be simulated"
     sampling = config.sampling
     if any(sampling.list_recordings().values()) or sampling.symmetries:

@@ -9,8 +9,10 @@ import numpy as np
 from paramreduce_cli.config.log_settings import Frequency, LogSection
 from paramreduce_cli.errors import ConfigError, DataError
 from paramreduce_cli.identification import filters
-from paramreduce_cli.identification.cutoff_selection import ComputeColumns, select_cutoffs
+from paramreduce_cli.identification.band_scoring import ComputeColumns
+from paramreduce_cli.identification.cutoff_selection import select_cutoffs
 from paramreduce_cli.identification.data_split import Piece, split_pieces, trim_files
+from paramreduce_cli.identification.friction_selection import FrictionModel, select_friction
 from paramreduce_cli.identification.log_checks import find_log_warnings
 from paramreduce_cli.identification.log_signals import (
     Outliers,
@@ -36,6 +38,7 @@ from paramreduce_cli.records import (
     BoolArray,
     CutoffSearch,
     FloatArray,
+    FrictionSearch,
     IntArray,
     MeasuredLog,
     MeasuredMotions,
@@ -71,6 +74,7 @@ def process_logs(
     report_progress: ProgressCallback = lambda _: None,
     unmeasured: Collection[str] = (),
     compute_columns: ComputeColumns | None = None,
+    friction: FrictionModel | None = None,
 ) -> MeasuredLog:
     """Process logs for identification.
 
@@ -85,6 +89,7 @@ def process_logs(
         unmeasured: Coordinates without torques.
         compute_columns: Function that returns the base parameters' columns of the observation matrix; None without a
             model.
+        friction: Drives whose friction the log decides; None if there are none.
 
     Raises:
         ConfigError: A setting does not fit the robot or the log.
@@ -123,11 +128,14 @@ def process_logs(
     begin(1)
     spectra = _estimate_spectra(longest, rate)
     given = _read_cutoffs(section, rate)
-    search = None
-    if compute_columns is not None and None in given:
-        measured = np.array([name not in unmeasured for name in names])
+    search, shape = None, None
+    measured = np.array([name not in unmeasured for name in names])
+    if compute_columns is not None and (None in given or friction is not None):
         search = select_cutoffs(raw, rate, spectra, compute_columns, measured, given, section.folds)
     cutoffs = _choose_cutoffs(given, spectra, search, steps)
+    if search is not None and friction is not None:
+        shape = select_friction(raw, rate, search, friction, measured, section.folds)
+        steps += _describe_friction(shape)
     thin = choose_decimation(cutoffs, rate, section.rate or rate)
 
     def ready(pieces: list[Piece]) -> list[Piece]:
@@ -165,6 +173,7 @@ def process_logs(
         ),
         spectra=spectra,
         search=search,
+        friction=shape,
         steps=tuple(steps),
         warnings=tuple(warnings),
     )
@@ -400,6 +409,28 @@ def _describe_search(
                 f"Cross-validation within the training part compares {cutoffs.size} {name} cut-offs; torques up to "
                 f"{search.scored:.3g} Hz are missed by {listed}."
             )
+
+
+def _describe_friction(found: FrictionSearch | None) -> Iterator[str]:
+    """Yield sentences on the friction that was chosen."""
+    if found is None:
+        return
+    listed = ", ".join(
+        f"{name} {speed:.3g}" for name, speed in zip(found.drives, found.smoothing, strict=True)
+    )
+    yield (
+        f"Friction: Coulomb friction is smoothed below the speeds {listed} (0: not smoothed). Left-out torques are missed by "
+        f"{format_percent(found.error)}, with the smoothing to begin with by {format_percent(found.usual_error)}."
+    )
+    terms = [
+        ("Stribeck", np.isfinite(found.stribeck_velocity)),
+        ("asymmetric viscous", found.asymmetry),
+        ("quadratic", found.quadratic),
+    ]
+    for term, chosen in terms:
+        names = [name for name, flag in zip(found.drives, chosen, strict=True) if flag]
+        if names:
+            yield f"Friction: {term} terms are added to {', '.join(names)}."
 
 
 def _describe_cutoff(cutoff: float) -> str:

@@ -54,6 +54,20 @@ def _express_friction_sign(drive: Drive, states: Sequence[Sequence[Any]], odd: O
     return odd.tanh(speed * (1 / drive.smoothing)) if drive.smoothing else odd.sign(speed)
 
 
+def _express_stribeck(drive: Drive, states: Sequence[Sequence[Any]], odd: OddFunctions) -> Any:
+    """Return the factor of friction that is large at low speed and fades, a difference of two signs [Makkar2005]."""
+    speed = sum_along(drive, states[1])
+    return _express_friction_sign(drive, states, odd) - odd.tanh(
+        speed * (1 / drive.stribeck_velocity)
+    )
+
+
+def _express_magnitude(drive: Drive, states: Sequence[Sequence[Any]], odd: OddFunctions) -> Any:
+    """Return the magnitude of a drive's speed."""
+    speed = sum_along(drive, states[1])
+    return speed * odd.sign(speed)
+
+
 def smooth_friction(mechanism: Mechanism, speeds: FloatArray) -> Mechanism:
     """Return the mechanism with a smooth sign in Coulomb friction, so that gradients exist; a mechanism without such
     friction is returned as it is.
@@ -62,7 +76,9 @@ def smooth_friction(mechanism: Mechanism, speeds: FloatArray) -> Mechanism:
         mechanism: The mechanism.
         speeds: Largest speeds of the independent coordinates, (n_dof,), rad/s or m/s.
     """
-    if all(parameter.kind is not Kind.COULOMB for parameter in mechanism.parameters):
+    if all(
+        parameter.kind not in (Kind.COULOMB, Kind.STRIBECK) for parameter in mechanism.parameters
+    ):
         return mechanism
     fastest = np.full(mechanism.n_q, speeds.max())
     fastest[list(mechanism.independent)] = speeds
@@ -86,5 +102,10 @@ _FORCES: dict[Kind, Callable[[Drive, Sequence[Sequence[Any]], OddFunctions], Any
     Kind.COULOMB: _express_friction_sign,
     Kind.OFFSET: lambda drive, states, odd: 1.0,
     Kind.STIFFNESS: lambda drive, states, odd: sum_along(drive, states[0]) - drive.rest,
+    Kind.STRIBECK: _express_stribeck,
+    Kind.ASYMMETRY: lambda drive, states, odd: _express_magnitude(drive, states, odd),
+    Kind.QUADRATIC: lambda drive, states, odd: (
+        sum_along(drive, states[1]) * _express_magnitude(drive, states, odd)
+    ),
 }
 """Force along a drive's motion for a unit value of each parameter; states are q, dq and ddq."""

@@ -11,6 +11,7 @@ from paramreduce_cli.records.logs import (
     Consistency,
     CutoffSearch,
     Estimate,
+    FrictionSearch,
     Identification,
     MeasuredLog,
     MeasuredMotions,

@@ -6,7 +6,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from paramreduce_cli.records.arrays import FloatArray, IntArray
+from paramreduce_cli.records.arrays import BoolArray, FloatArray, IntArray
 from paramreduce_cli.records.reduction import ReducedModel
 from paramreduce_cli.records.representation import record
 
@@ -136,6 +136,26 @@ class CutoffSearch:
 
 
 @record
+class FrictionSearch:
+    """The shape of the friction of drives, chosen by cross-validation."""
+
+    drives: tuple[str, ...]
+    """Names of the drives, (n_drives,)."""
+    smoothing: FloatArray
+    """Speed of the smoothing of Coulomb friction, zero for the sign of the speed, rad/s or m/s, (n_drives,)."""
+    stribeck_velocity: FloatArray
+    """Speed beyond which Stribeck friction fades, rad/s or m/s; not a number for drives without such friction, (n_drives,)."""
+    asymmetry: BoolArray
+    """Whether viscous friction differs by direction, (n_drives,)."""
+    quadratic: BoolArray
+    """Whether there is friction that is quadratic in the speed, (n_drives,)."""
+    error: float
+    """Relative error of torques on left-out folds with this friction."""
+    usual_error: float
+    """The same with the smoothing that the search began with."""
+
+
+@record
 class MeasuredLog:
     """A log made ready: motions to train on and motions held out, and what was done to them."""
 
@@ -162,7 +182,9 @@ class MeasuredLog:
     shown: ShownSignals
     spectra: Spectra
     search: CutoffSearch | None
-    """Search for cut-off frequencies; None if the config gives both, or without a model."""
+    """Search for cut-off frequencies; None if the config gives all, or without a model."""
+    friction: FrictionSearch | None
+    """Search for the shape of friction; None if the config asks for none."""
     steps: tuple[str, ...]
     """Processing steps, one sentence each."""
     warnings: tuple[str, ...]

@@ -134,6 +134,8 @@ class Drive:
     """Speed s at which Coulomb friction, tanh(speed / s), is 76 %; zero for the sign of the speed."""
     rest: float = 0.0
     """Position where the spring is slack, rad or m."""
+    stribeck_velocity: float = 0.1
+    """Speed s beyond which the Stribeck friction, which has the factor sign(speed) - tanh(speed / s), fades."""
 
 
 @record

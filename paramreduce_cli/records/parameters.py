@@ -35,6 +35,9 @@ class Kind(Enum):
     COULOMB = ("fc", "N m", 12, "f", "c", "coulomb", "N", None)
     OFFSET = ("off", "N m", 13, "f", "0", "offset", "N", None)
     STIFFNESS = ("k", "N m/rad", 14, "k", "", "stiffness", "N/m", 0)
+    STRIBECK = ("fs", "N m", 15, "f", "s", "stribeck", "N", None)
+    ASYMMETRY = ("fa", "N m s/rad", 16, "f", "a", "asymmetry", "N s/m", None)
+    QUADRATIC = ("fq", "N m s^2/rad^2", 17, "f", "q", "quadratic", "N s^2/m^2", None)
 
     def __init__(
         self, symbol: str, unit: str, preference: int, letter: str, axes: str,
@@ -55,7 +58,7 @@ class Kind(Enum):
     @property
     def is_signed(self) -> bool:
         """Whether the parameter may be negative on a real drive."""
-        return self is Kind.OFFSET
+        return self in (Kind.OFFSET, Kind.STRIBECK, Kind.ASYMMETRY, Kind.QUADRATIC)
 
     @classmethod
     def parse(cls, symbol: str) -> Kind:

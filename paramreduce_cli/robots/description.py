@@ -17,7 +17,14 @@ from paramreduce_cli.fields.section import (
     Triple,
     expand_per_joint,
 )
-from paramreduce_cli.records import INERTIAL, BoolArray, FloatArray, Mechanism, Parameter
+from paramreduce_cli.records import (
+    INERTIAL,
+    BoolArray,
+    FloatArray,
+    FrictionSearch,
+    Mechanism,
+    Parameter,
+)
 from paramreduce_cli.robots.bodies import BodiesDescription
 from paramreduce_cli.robots.dh import DHDescription
 from paramreduce_cli.robots.drives import DriveSection, merge_drives
@@ -119,6 +126,18 @@ class Robot(Section):
     def list_drives(self) -> dict[str, DriveSection]:
         """Return all drives by name."""
         return merge_drives(self.drives, self.description.bodies.list_driven_coordinates())
+
+    @property
+    def automatic_friction(self) -> list[str]:
+        """Names of the drives whose friction a log decides."""
+        return [name for name, drive in self.list_drives().items() if drive.friction == "auto"]
+
+    def apply_friction(self, found: FrictionSearch) -> Robot:
+        """Return the robot with the friction that was found for some of its drives."""
+        drives = self.list_drives()
+        for k, name in enumerate(found.drives):
+            drives[name] = drives[name].apply_friction(found, k)
+        return self.model_copy(update={"drives": drives})
 
     def list_parameters(self) -> tuple[Parameter, ...]:
         """Return all parameters: body by body, then payload by payload, then drive by drive."""

@@ -11,12 +11,17 @@ from pydantic import Field, model_validator
 from paramreduce_cli.fields.names import Problem, UnknownNameError
 from paramreduce_cli.fields.numbers import Number
 from paramreduce_cli.fields.section import Section
-from paramreduce_cli.records import DRIVE, Drive, Kind
+from paramreduce_cli.records import DRIVE, Drive, FrictionSearch, Kind
 
 ALL = "all"
 """Key of what every driven coordinate has."""
 
 Value = Number | Literal["unknown"]
+
+_USUAL_FRICTION = (Kind.VISCOUS, Kind.COULOMB, Kind.OFFSET)
+"""What a drive has whose friction a log decides."""
+_PROVISIONAL_SMOOTHING = 0.05
+"""Smoothing, rad/s (m/s), until a log decides."""
 
 
 class DriveSection(Section):
@@ -38,19 +43,31 @@ class DriveSection(Section):
     """Stiffness of a spring, N m/rad (N/m)."""
     rest: Number = 0.0
     """Position where the spring is slack, rad (m)."""
+    stribeck: Value | None = None
+    """Additional friction at low speed, N m (N); it fades beyond stribeck_velocity."""
+    asymmetry: Value | None = None
+    """Viscous friction with the same sign for both directions, N m s/rad (N s/m): friction that differs by direction."""
+    quadratic: Value | None = None
+    """Friction that goes as speed times its magnitude, N m s^2/rad^2 (N s^2/m^2)."""
     smoothing: Annotated[Number, Field(ge=0)] = 0.0
     """Coulomb friction goes as tanh(speed / smoothing), rad/s (m/s); zero for the true sign."""
+    stribeck_velocity: Annotated[Number, Field(gt=0)] = 0.1
+    """Stribeck friction goes as sign(speed) - tanh(speed / stribeck_velocity), rad/s (m/s), with the sign of Coulomb friction."""
+    friction: Literal["given", "auto"] = "given"
+    """With auto the log decides: viscous and Coulomb friction and an offset are unknown, smoothing is chosen, and stribeck, asymmetry and quadratic are added where they help."""
 
     @model_validator(mode="after")
     def _check_not_empty(self) -> DriveSection:
         """Raise ValueError if the section gives nothing."""
-        if not self.get_values() and "smoothing" not in self.model_fields_set:
+        if not self.get_values() and not {"smoothing", "stribeck_velocity"} & self.model_fields_set:
             raise ValueError(f"is empty; give one of {', '.join(kind.key for kind in DRIVE)}")
         return self
 
     def get_values(self) -> dict[Kind, float]:
         """Return the values of the drive's parameters by kind; zero for unknown ones."""
         given = {kind: getattr(self, kind.key) for kind in DRIVE}
+        if self.friction == "auto":
+            given |= {kind: "unknown" for kind in _USUAL_FRICTION if given[kind] is None}
         return {
             kind: 0.0 if value == "unknown" else value
             for kind, value in given.items()
@@ -59,7 +76,24 @@ class DriveSection(Section):
 
     def list_unknown(self) -> list[str]:
         """Return the keys of the values that are still to be found."""
-        return [kind.key for kind in DRIVE if getattr(self, kind.key) == "unknown"]
+        known = [kind for kind in DRIVE if getattr(self, kind.key) not in (None, "unknown")]
+        return [kind.key for kind in self.get_values() if kind not in known]
+
+    def apply_friction(self, found: FrictionSearch, k: int) -> DriveSection:
+        """Return the section with the k-th friction that was found; terms that are added are unknown."""
+        added = {
+            Kind.STRIBECK: bool(np.isfinite(found.stribeck_velocity[k])),
+            Kind.ASYMMETRY: bool(found.asymmetry[k]),
+            Kind.QUADRATIC: bool(found.quadratic[k]),
+        }
+        kinds = [*_USUAL_FRICTION, *(kind for kind, flag in added.items() if flag)]
+        update: dict[str, object] = {
+            kind.key: "unknown" for kind in kinds if getattr(self, kind.key) is None
+        }
+        if added[Kind.STRIBECK]:
+            update["stribeck_velocity"] = float(found.stribeck_velocity[k])
+        update |= {"smoothing": float(found.smoothing[k]), "friction": "given"}
+        return self.model_copy(update=update)
 
     def merge_defaults(self, other: DriveSection | None) -> DriveSection:
         """Return the section with missing keys taken from another one."""
@@ -78,7 +112,10 @@ class DriveSection(Section):
         weights = np.zeros(len(coordinates))
         for coordinate, weight in (self.motion or {name: 1.0}).items():
             weights[coordinates.index(coordinate)] = weight
-        return Drive(name, weights, self.smoothing, self.rest)
+        smoothing = self.smoothing
+        if self.friction == "auto" and "smoothing" not in self.model_fields_set:
+            smoothing = _PROVISIONAL_SMOOTHING
+        return Drive(name, weights, smoothing, self.rest, self.stribeck_velocity)
 
 
 def merge_drives(

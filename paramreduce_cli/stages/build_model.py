@@ -23,6 +23,7 @@ from paramreduce_cli.records import (
     BoolArray,
     FloatArray,
     IntArray,
+    MeasuredLog,
     Mechanism,
     Model,
     Run,
@@ -40,15 +41,23 @@ _SEED = 0
 """Seed of the random states on which ranks are decided."""
 
 
-def build_model(robot: Robot, model: ModelSection, run: Run) -> Model:
+def build_model(robot: Robot, model: ModelSection, log: MeasuredLog | None, run: Run) -> Model:
     """Derive the model, its parameters and its base parameters.
+
+    Friction that the config leaves to the log is that of the processed log.
 
     The number of base parameters is determined on seeded random states. An interrupted run starts again; it takes less
     than a minute for thirty joints.
 
     Raises:
         ConfigError: The nominal torque of a joint is zero and the config gives none.
+        DataError: The log is to decide on friction, and is not processed.
     """
+    if robot.automatic_friction:
+        if log is None:
+            raise DataError("there is no log.h5, which decides on friction.", command="process-log")
+        if log.friction is not None:
+            robot = robot.apply_friction(log.friction)
     mechanism = assemble(robot.build_mechanism())
     rng = np.random.default_rng(_SEED)
     states = draw_states(mechanism, _STATES, rng)

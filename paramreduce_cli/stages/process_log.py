@@ -2,14 +2,16 @@
 
 import warnings
 
-import numpy as np
-
 from paramreduce_cli.config.log_settings import LogSection
 from paramreduce_cli.errors import ConfigError, ParamreduceWarning
-from paramreduce_cli.identification.cutoff_selection import make_column_function
+from paramreduce_cli.identification.band_scoring import make_column_function
+from paramreduce_cli.identification.friction_selection import make_friction_model
 from paramreduce_cli.identification.processing import process_logs
+from paramreduce_cli.identification.quality import find_base
 from paramreduce_cli.multibody.dynamics import Dynamics
-from paramreduce_cli.records import MeasuredLog, Model, ProgressCallback, RawLogs
+from paramreduce_cli.multibody.loops.assembly import assemble
+from paramreduce_cli.records import MeasuredLog, ProgressCallback, RawLogs
+from paramreduce_cli.robots import Robot
 
 
 def make_no_log_error() -> ConfigError:
@@ -22,27 +24,57 @@ def make_no_log_error() -> ConfigError:
 
 
 def process_log(
+    robot: Robot,
     log: LogSection | None,
-    model: Model,
     logs: RawLogs,
     report_progress: ProgressCallback = lambda _: None,
 ) -> MeasuredLog:
     """Process logs: clean, filter, differentiate and split them.
 
-    The result includes sentences on each processing step, and warnings about suspicious data.
+    The cut-off frequencies, and the shape of friction where the config asks for that, are chosen by cross-validation
+    within the training part. The result includes sentences on each processing step, and warnings about suspicious data.
 
     Raises:
         ConfigError: The config names no log.
     """
     if log is None:
         raise make_no_log_error()
-    names = model.mechanism.coordinate_names
-    unmeasured = [
-        name for name, size in zip(names, model.nominal_torque, strict=True) if np.isinf(size)
-    ]
-    dynamics = Dynamics(model.mechanism, once=True)
-    compute_columns = make_column_function(dynamics, model.base.columns)
-    found = process_logs(logs, log, names, report_progress, unmeasured, compute_columns)
+    dynamics = Dynamics(assemble(robot.build_mechanism()), once=True)
+    found = process_logs_of_robot(dynamics, robot, log, logs, report_progress)
     for text in found.warnings:
         warnings.warn(f"log: {text.rstrip('.')}", ParamreduceWarning, stacklevel=2)
     return found
+
+
+def process_logs_of_robot(
+    dynamics: Dynamics,
+    robot: Robot,
+    log: LogSection,
+    logs: RawLogs,
+    report_progress: ProgressCallback = lambda _: None,
+) -> MeasuredLog:
+    """Process logs with the model of a robot at hand.
+
+    Args:
+        dynamics: Dynamics of the robot.
+        robot: The robot.
+        log: Settings of the section for logs.
+        logs: Logs as recorded.
+        report_progress: Progress callback.
+    """
+    base = find_base(dynamics, robot.find_measured()).columns
+    names = robot.automatic_friction
+    friction = None
+    if names:
+        drives = robot.list_drives()
+        fixed = [name for name in names if "smoothing" in drives[name].model_fields_set]
+        friction = make_friction_model(dynamics, base, names, fixed)
+    return process_logs(
+        logs,
+        log,
+        dynamics.mechanism.coordinate_names,
+        report_progress,
+        robot.unmeasured,
+        make_column_function(dynamics, base),
+        friction,
+    )

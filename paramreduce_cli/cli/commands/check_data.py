@@ -38,11 +38,11 @@ def check_data(file: Path, config: Path | None, overrides: tuple[str, ...]) -> N
     """
     # Late: these load all numerics.
     from paramreduce_cli.artifacts.log_files import load_log, load_recorded
-    from paramreduce_cli.identification.cutoff_selection import make_column_function
     from paramreduce_cli.identification.processing import process_logs
     from paramreduce_cli.identification.quality import find_base, measure_quality
     from paramreduce_cli.multibody.dynamics import Dynamics
     from paramreduce_cli.records import RawLogs
+    from paramreduce_cli.stages.process_log import process_logs_of_robot
 
     if file.suffix in (".yaml", ".yml"):
         raise ConfigError(
@@ -75,11 +75,12 @@ def check_data(file: Path, config: Path | None, overrides: tuple[str, ...]) -> N
             log, found = process_logs(logs, section, joints), None
         else:
             dynamics = Dynamics(mechanism, once=True)
+            log = process_logs_of_robot(dynamics, loaded, section, logs)
+            if log.friction is not None:
+                dynamics = Dynamics(
+                    loaded.apply_friction(log.friction).build_mechanism(), once=True
+                )
             base = find_base(dynamics, loaded.find_measured())
-            compute_columns = make_column_function(dynamics, base.columns)
-            log = process_logs(
-                logs, section, joints, unmeasured=loaded.unmeasured, compute_columns=compute_columns
-            )
             found = measure_quality(dynamics, base, log)
     for text in log.steps:
         say(text)

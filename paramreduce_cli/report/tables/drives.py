@@ -21,7 +21,9 @@ def drives(data: ReportData) -> Table:
             else ""
             for kind in DRIVE
         ]
-        sign = _sign(drive) if Kind.COULOMB in columns else ""
+        sign = _sign(drive) if Kind.COULOMB in columns or Kind.STRIBECK in columns else ""
+        if Kind.STRIBECK in columns:
+            sign += f", {drive.stribeck_velocity:g}"
         slack = f"{drive.rest:g}" if Kind.STIFFNESS in columns else ""
         rows.append((drive.name, _describe_motion(mechanism, drive), *cells, sign, slack))
     header = ("drive", "motion", *(kind.symbol for kind in DRIVE), "sign of speed", "slack at")
