@@ -209,7 +209,7 @@ def _kind(entry: Schema, schema: Schema) -> str:
     return words.get(str(entry.get("type")), "anything")
 
 
-_UNITS = ("rad/s^2", "rad/s", "rad", "kg m^2", "kg m", "kg", "m/s^2", "m/s", "m", "N m s/rad", "N m/rad", "N m", "N", "Hz", "W", "s", "share")  # fmt: skip
+_UNITS = ("rad/s^2", "rad/s", "rad", "kg m^2", "kg m", "kg", "m/s^2", "m/s", "m", "N m s^2/rad^2", "N m s/rad", "N m/rad", "N m", "N", "Hz", "W", "s", "share")  # fmt: skip
 
 
 def _unit(text: str) -> str:

@@ -41,7 +41,9 @@ _SEED = 0
 """Seed of the random states on which ranks are decided."""
 
 
-def build_model(robot: Robot, model: ModelSection, log: MeasuredLog | None, run: Run) -> Model:
+def build_model(
+    robot: Robot, model: ModelSection, run: Run, log: MeasuredLog | None = None
+) -> Model:
     """Derive the model, its parameters and its base parameters.
 
     Friction that the config leaves to the log is that of the processed log.

@@ -7,10 +7,8 @@ from simulated_logs import TWO_LINK, two_link_log
 
 from paramreduce_cli.config import load_config
 from paramreduce_cli.config.log_settings import LogSection
-from paramreduce_cli.identification.cutoff_selection import (
-    find_motion_frequency,
-    make_column_function,
-)
+from paramreduce_cli.identification.band_scoring import make_column_function
+from paramreduce_cli.identification.cutoff_selection import find_motion_frequency
 from paramreduce_cli.identification.processing import process_logs
 from paramreduce_cli.identification.quality import find_base
 from paramreduce_cli.multibody.dynamics import Dynamics

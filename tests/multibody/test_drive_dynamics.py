@@ -19,9 +19,9 @@ from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.multibody.loops.assembly import assemble
 from paramreduce_cli.multibody.random_states import draw_states
 from paramreduce_cli.multibody.textbook_dynamics import PlainDynamics
-from paramreduce_cli.records import Drive, Formulations, Kind, Parameter, Payload
+from paramreduce_cli.records import DRIVE, Drive, Formulations, Kind, Parameter, Payload
 
-EVERYTHING = (Kind.ROTOR, Kind.VISCOUS, Kind.COULOMB, Kind.OFFSET, Kind.STIFFNESS)
+EVERYTHING = DRIVE
 
 
 def with_everything(mechanism, seed=0):
@@ -29,7 +29,7 @@ def with_everything(mechanism, seed=0):
     rng = np.random.default_rng(seed)
     n = mechanism.n_q
     drives = [
-        Drive(f"d{k}", weights, smoothing=0.3 * (k % 2), rest=0.2 * k)
+        Drive(f"d{k}", weights, smoothing=0.3 * (k % 2), rest=0.2 * k, stribeck_velocity=0.7)
         for k, weights in enumerate(np.eye(n))
     ]
     coupled = np.zeros(n)

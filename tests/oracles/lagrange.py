@@ -33,6 +33,10 @@ class Lagrange:
             friction = value.get(Kind.VISCOUS, 0) * speed
             slope = ca.tanh(speed / drive.smoothing) if drive.smoothing else ca.sign(speed)
             friction += value.get(Kind.COULOMB, 0) * slope
+            fading = slope - ca.tanh(speed / drive.stribeck_velocity)
+            friction += value.get(Kind.STRIBECK, 0) * fading
+            friction += value.get(Kind.ASYMMETRY, 0) * ca.fabs(speed)
+            friction += value.get(Kind.QUADRATIC, 0) * speed * ca.fabs(speed)
             lost += friction * ca.gradient(speed, dq)
         momentum = ca.gradient(kinetic, dq)
         rate = ca.jtimes(momentum, q, dq) + ca.jtimes(momentum, dq, ddq)

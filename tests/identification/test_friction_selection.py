@@ -1,0 +1,123 @@
+"""The shape of friction of a two-link arm whose friction is known."""
+
+import numpy as np
+import pytest
+from simulated_logs import TWO_LINK, two_link_log
+
+from paramreduce_cli.config import load_config
+from paramreduce_cli.config.log_settings import LogSection
+from paramreduce_cli.multibody.dynamics import Dynamics
+from paramreduce_cli.records import Kind, RawLog, RawLogs
+from paramreduce_cli.stages.process_log import process_logs_of_robot
+
+AUTO = {"all": {"friction": "auto"}}
+
+
+def robot(drives=AUTO):
+    log = "sampling={log: {files: log.csv}}"
+    return load_config(TWO_LINK, [f"drives={drives}", log, "validation.accept={}"])
+
+
+def searched(friction, drives=AUTO, noise=0.01, seed=0, **keys):
+    """The search on a log whose friction is a function of the speeds, (n_samples, 2)."""
+    log = two_link_log(seconds=30.0, rate=200.0, noise=0.0)
+    dz = np.column_stack([log["dq1"], log["dq2"]])
+    bare = load_config(TWO_LINK)
+    still = np.column_stack([log["q1"], log["q2"]])
+    ddz = np.gradient(dz, log["t"], axis=0)
+    tau = (
+        Dynamics(bare.build_mechanism(), once=True).compute_regressor(still, dz, ddz)
+        @ bare.get_values()
+    )
+    tau += friction(dz) + noise * np.random.default_rng(seed).normal(size=tau.shape)
+    log = {"t": log["t"], "q1": log["q1"], "q2": log["q2"], "tau1": tau[:, 0], "tau2": tau[:, 1]}
+    section = LogSection(files=["log.csv"], **keys)
+    config = robot(drives)
+    dynamics = Dynamics(config.build_mechanism(), once=True)
+    logs = RawLogs((RawLog("log.csv", log, 2),), ())
+    return config, process_logs_of_robot(dynamics, config, section, logs)
+
+
+def test_each_joint_gets_its_smoothing():
+    def friction(dz):
+        return np.tanh(dz / [0.5, 0.02]) * [1.2, 0.5] + [0.8, 0.2] * dz
+
+    _, found = searched(friction, noise=0.1)
+    search = found.friction
+    assert search.drives == ("z_upper", "z_fore")
+    assert 0.3 < search.smoothing[0] < 0.8
+    assert search.smoothing[1] < 0.1
+    assert search.error < 0.5 * search.usual_error
+    assert np.isnan(search.stribeck_velocity).all()
+    assert not search.asymmetry.any()
+    assert not search.quadratic.any()
+
+
+@pytest.mark.parametrize(
+    ("term", "factor"),
+    [
+        ("stribeck_velocity", lambda v: 1.5 * (np.tanh(v / 0.02) - np.tanh(v / 0.4))),
+        ("asymmetry", lambda v: 0.3 * np.abs(v)),
+        ("quadratic", lambda v: 0.3 * v * np.abs(v)),
+    ],
+)
+def test_a_term_is_added_where_it_is(term, factor):
+    def friction(dz):
+        tau = np.tanh(dz / 0.02) * [1.2, 0.5] + [0.8, 0.2] * dz
+        tau[:, 0] += factor(dz[:, 0])
+        return tau
+
+    config, found = searched(friction)
+    added = getattr(found.friction, term)
+    chosen = np.isfinite(added) if term == "stribeck_velocity" else added
+    assert chosen[0]
+    changed = config.apply_friction(found.friction)
+    kinds = {p.kind for p in changed.build_mechanism().parameters if p.owner == "z_upper"}
+    expected = {
+        "stribeck_velocity": Kind.STRIBECK,
+        "asymmetry": Kind.ASYMMETRY,
+        "quadratic": Kind.QUADRATIC,
+    }
+    assert {Kind.VISCOUS, Kind.COULOMB, Kind.OFFSET, expected[term]} <= kinds
+    assert changed.automatic_friction == []
+
+
+def test_noise_alone_adds_no_terms():
+    def friction(dz):
+        return np.tanh(dz / 0.05) * [1.2, 0.5] + [0.8, 0.2] * dz
+
+    added = 0
+    for seed in range(5):
+        search = searched(friction, noise=0.3, seed=seed)[1].friction
+        added += np.count_nonzero(
+            search.asymmetry | search.quadratic | np.isfinite(search.stribeck_velocity)
+        )
+    assert added <= 1
+
+
+def test_a_given_smoothing_stays():
+    def friction(dz):
+        return np.tanh(dz / 0.5) * [1.2, 0.5] + [0.8, 0.2] * dz
+
+    drives = {"all": {"friction": "auto"}, "z_upper": {"smoothing": 0.1, "viscous": 0.8}}
+    config, found = searched(friction, drives)
+    assert found.friction.smoothing[0] == 0.1
+    assert found.friction.smoothing[1] > 0.2
+    section = config.apply_friction(found.friction).drives["z_upper"]
+    assert (section.viscous, section.coulomb) == (0.8, "unknown")
+
+
+def test_cutoffs_that_are_given_are_kept():
+    def friction(dz):
+        return np.tanh(dz / 0.3) + dz
+
+    _, found = searched(friction, state_cutoff=20, torque_cutoff=5)
+    assert (found.state_cutoff, found.torque_cutoff) == (20, 5)
+    assert found.friction.error < found.friction.usual_error
+
+
+def test_without_a_log_nothing_decides(tmp_path):
+    from paramreduce_cli.errors import ConfigError
+
+    with pytest.raises(ConfigError, match=r"is auto, but there is no sampling.log"):
+        load_config(TWO_LINK, [f"drives={AUTO}"])
