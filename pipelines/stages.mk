@@ -13,14 +13,14 @@ made = $(if $(made_$(1)),,$(eval made_$(1) := $(shell \
 if_made = $(addprefix $(RESULTS)/$(1)/,$(filter $(2),$(call made,$(1))))
 .SECONDEXPANSION:
 
-$(RESULTS)/%/model.h5: $(CONFIGS)/%.yaml | $(PARAMREDUCE_READY)
+$(RESULTS)/%/log.h5: $(CONFIGS)/%.yaml | $(PARAMREDUCE_READY)
+	$(PARAMREDUCE) process-log $< --results $(RESULTS)/$* $(PARAMREDUCE_FLAGS)
+
+$(RESULTS)/%/model.h5: $(CONFIGS)/%.yaml $$(call if_made,$$*,log.h5) | $(PARAMREDUCE_READY)
 	$(PARAMREDUCE) build-model $< --results $(RESULTS)/$* $(PARAMREDUCE_FLAGS)
 
 $(RESULTS)/%/trajectories.h5: $(CONFIGS)/%.yaml $$(call if_made,$$*,model.h5) | $(PARAMREDUCE_READY)
 	$(PARAMREDUCE) optimize-trajectories $< --results $(RESULTS)/$* $(PARAMREDUCE_FLAGS)
-
-$(RESULTS)/%/log.h5: $(CONFIGS)/%.yaml $$(call if_made,$$*,model.h5) | $(PARAMREDUCE_READY)
-	$(PARAMREDUCE) process-log $< --results $(RESULTS)/$* $(PARAMREDUCE_FLAGS)
 
 $(RESULTS)/%/samples.h5: $(CONFIGS)/%.yaml $$(call if_made,$$*,model.h5 trajectories.h5 log.h5) | $(PARAMREDUCE_READY)
 	$(PARAMREDUCE) sample $< --results $(RESULTS)/$* $(PARAMREDUCE_FLAGS)
@@ -40,4 +40,4 @@ $(RESULTS)/%/identification.h5: $(CONFIGS)/%.yaml $$(call if_made,$$*,log.h5 mod
 $(RESULTS)/%/report/summary.json: $(CONFIGS)/%.yaml $$(call if_made,$$*,model.h5 trajectories.h5 reduction.h5 validation.h5 log.h5 identification.h5 terms.h5 samples.h5) | $(PARAMREDUCE_READY)
 	$(PARAMREDUCE) report $< --results $(RESULTS)/$* $(PARAMREDUCE_FLAGS)
 
-.PRECIOUS: $(RESULTS)/%/model.h5 $(RESULTS)/%/trajectories.h5 $(RESULTS)/%/log.h5 $(RESULTS)/%/samples.h5 $(RESULTS)/%/reduction.h5 $(RESULTS)/%/terms.h5 $(RESULTS)/%/validation.h5 $(RESULTS)/%/identification.h5 $(RESULTS)/%/report/summary.json
+.PRECIOUS: $(RESULTS)/%/log.h5 $(RESULTS)/%/model.h5 $(RESULTS)/%/trajectories.h5 $(RESULTS)/%/samples.h5 $(RESULTS)/%/reduction.h5 $(RESULTS)/%/terms.h5 $(RESULTS)/%/validation.h5 $(RESULTS)/%/identification.h5 $(RESULTS)/%/report/summary.json

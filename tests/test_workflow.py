@@ -14,7 +14,7 @@ def test_committed_rules_are_those_of_the_declared_stages():
 
 def test_outline_names_every_stage():
     lines = format_outline().splitlines()
-    assert lines[0] == "build-model: the config -> model.h5"
+    assert lines[:2] == ["process-log: the config -> log.h5", "build-model: log.h5 -> model.h5"]
     assert len(lines) == 9
 
 

@@ -10,7 +10,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import scipy  # its linalg is loaded when it is used
+import scipy  # whose parts load when they are first used
 
 from paramreduce_cli.identification.band_scoring import (
     Band,
@@ -33,13 +33,21 @@ from paramreduce_cli.records import (
     Kind,
 )
 
-_SMOOTHINGS = (0.0, 0.01, 0.02, 0.04, 0.08, 0.16, 0.32)
+_RATIO = 1.5
+"""Ratio of neighbouring speeds of smoothing."""
+_SMOOTHINGS = (0.0, *(0.01 * _RATIO**k for k in range(10)))
 """Speeds of smoothing that are tried, a share of the largest speed of the drive."""
 _FRICTION = (Kind.COULOMB, Kind.STRIBECK, Kind.ASYMMETRY, Kind.QUADRATIC)
 _GAIN = 0.005
 """Relative decrease of the error for which a joint gets another smoothing than the others."""
-_TERM_GAIN = 0.01
+_TERM_GAIN = 0.02
 """Relative decrease of the error for which a term is added."""
+_GEOMETRIC = 2
+"""First of the candidates of a drive whose speeds form a geometric sequence: after the given smoothing and the sign."""
+_STEP = 0.05
+"""Accuracy of smoothings, in steps between candidates."""
+_LEAST_RATIO = 4.0
+"""Ratio of the speed beyond which Stribeck friction fades to that of the smoothing."""
 _SWEEPS = 2
 _RIDGE = 1e-10
 """Added to normal equations with unit diagonal, so that dependent columns do no harm."""
@@ -187,8 +195,17 @@ def _compute_friction(
     return np.stack(columns, axis=1)[:, None, :] * weights[:, None]
 
 
-_Choice = tuple[tuple[int, ...], ...]
-"""Indices of each drive's candidates that are in the model, the sign first."""
+@dataclass(frozen=True)
+class _Choice:
+    """The friction of one drive.
+
+    Attributes:
+        sign: Index of the candidate for the sign; between two of the geometric smoothings it is not a whole number.
+        terms: Indices of further candidates.
+    """
+
+    sign: float
+    terms: tuple[int, ...] = ()
 
 
 class _Search:
@@ -212,9 +229,9 @@ class _Search:
         counts = [len(own) for own in candidates]
         self._n_rest = band.factors.shape[-1] - 1 - sum(counts)
         self._starts = self._n_rest + np.cumsum([0, *counts[:-1]])
-        start: _Choice = tuple((0,) for _ in candidates)
-        columns = self._list_columns(start)
-        factors = band.factors[..., [*columns, -1]]
+        self._start = tuple(_Choice(0) for _ in candidates)
+        T = self._combine_columns(self._start, band.factors.shape[-1])
+        factors = band.factors @ T
         squares = np.sum(factors[..., -1] ** 2, axis=(0, 2)) / band.n_samples
         scale = np.where(measured & (squares > 0), np.sqrt(squares), np.inf)
         noise = estimate_joint_noise(factors, scale, band.n_samples)
@@ -222,101 +239,157 @@ class _Search:
         plain = band.factors[:, measured]
         self._weighted = np.einsum("fjak,fjal->fkl", weighted, weighted)
         self._plain = np.einsum("fjak,fjal->fkl", plain, plain)
-        self._start = start
 
-    def _list_columns(self, choice: _Choice) -> list[int]:
-        """Return the columns of a choice."""
-        own = [int(s) + k for s, chosen in zip(self._starts, choice, strict=True) for k in chosen]
-        return [*range(self._n_rest), *own]
+    def _combine_columns(self, choices: Sequence[_Choice], n: int) -> FloatArray:
+        """Return the matrix that makes the columns of a choice, and the torques last, of all columns, (n, n_chosen + 1).
 
-    def _compute_errors(self, choice: _Choice) -> FloatArray:
+        Smoothings between those of the candidates are interpolated: columns are smooth in the logarithm of the speed.
+        """
+        columns: list[FloatArray] = list(np.eye(n)[: self._n_rest])
+        for start, choice in zip(self._starts.tolist(), choices, strict=True):
+            nodes, weights = _interpolate(choice.sign)
+            column = np.zeros(n)
+            column[start + nodes] = weights
+            columns += [column, *(np.eye(n)[start + k] for k in choice.terms)]
+        return np.column_stack([*columns, np.eye(n)[-1]])
+
+    def _compute_errors(self, choices: Sequence[_Choice]) -> FloatArray:
         """Return the squared error on each fold, relative to the torques of all folds, (n_folds,)."""
-        columns = np.array(self._list_columns(choice))
-        whole = self._weighted.sum(axis=0)
-        power = self._plain[:, -1, -1].sum()
+        T = self._combine_columns(choices, self._plain.shape[-1])
+        weighted, plain = T.T @ self._weighted @ T, T.T @ self._plain @ T
+        whole = weighted.sum(axis=0)
         errors = []
-        for fold, tested in zip(self._weighted, self._plain, strict=True):
+        for fold, tested in zip(weighted, plain, strict=True):
             G = whole - fold
-            lengths = np.sqrt(np.maximum(np.diag(G)[columns], 1e-300))
-            A = G[np.ix_(columns, columns)] / np.outer(lengths, lengths)
+            lengths = np.sqrt(np.maximum(np.diag(G)[:-1], 1e-300))
+            A = G[:-1, :-1] / np.outer(lengths, lengths)
             A[np.diag_indices_from(A)] += _RIDGE
-            values = scipy.linalg.solve(A, G[columns, -1] / lengths, assume_a="pos") / lengths
-            left = (
-                tested[-1, -1]
-                - 2 * tested[columns, -1] @ values
-                + values @ tested[np.ix_(columns, columns)] @ values
-            )
-            errors.append(max(0.0, float(left)) / power)
-        return np.array(errors)
+            values = scipy.linalg.solve(A, G[:-1, -1] / lengths, assume_a="pos") / lengths
+            residual = np.append(-values, 1.0)
+            errors.append(max(0.0, float(residual @ tested @ residual)))
+        return np.array(errors) / plain[:, -1, -1].sum()
 
     def run(self) -> FrictionSearch:
         """Return the choice: one smoothing for all drives, then one for each, then terms one after the other."""
-        choice, best = self._start, self._score(self._start)
+        choices, best = self._start, self._score(self._start)
         usual = best
         for k in range(1, 1 + len(_SMOOTHINGS)):
-            common = tuple((0,) if fixed else (k,) for fixed in self._model.fixed)
-            choice, best = min([(choice, best), (common, self._score(common))], key=lambda x: x[1])
+            common = tuple(_Choice(0 if fixed else k) for fixed in self._model.fixed)
+            error = self._score(common)
+            choices, best = (common, error) if error < best else (choices, best)
         for _ in range(_SWEEPS):
-            choice, best = self._refine(choice, best)
-        choice, best = self._add_terms(choice, best)
-        return self._describe(choice, best, usual)
+            choices, best = self._choose_smoothings(choices, best)
+        choices, best = self._refine_smoothings(choices, best)
+        choices, best = self._add_terms(choices, best)
+        return self._describe(choices, best, usual)
 
-    def _score(self, choice: _Choice) -> float:
+    def _score(self, choices: Sequence[_Choice]) -> float:
         """Return the relative error over all folds."""
-        return float(np.sqrt(self._compute_errors(choice).sum()))
+        return float(np.sqrt(self._compute_errors(choices).sum()))
 
-    def _refine(self, choice: _Choice, best: float) -> tuple[_Choice, float]:
+    def _choose_smoothings(
+        self, choices: tuple[_Choice, ...], best: float
+    ) -> tuple[tuple[_Choice, ...], float]:
         """Return the choice with another smoothing for those drives that gain by it."""
         for j, fixed in enumerate(self._model.fixed):
             for k in range(0 if fixed else 1 + len(_SMOOTHINGS)):
-                other = (*choice[:j], (k,), *choice[j + 1 :])
+                other = (*choices[:j], _Choice(k), *choices[j + 1 :])
                 error = self._score(other)
                 if error < (1 - _GAIN) * best:
-                    choice, best = other, error
-        return choice, best
+                    choices, best = other, error
+        return choices, best
 
-    def _add_terms(self, choice: _Choice, best: float) -> tuple[_Choice, float]:
+    def _refine_smoothings(
+        self, choices: tuple[_Choice, ...], best: float
+    ) -> tuple[tuple[_Choice, ...], float]:
+        """Return the choice with smoothings between those of the candidates."""
+        last = float(len(_SMOOTHINGS))
+        for j, choice in enumerate(choices):
+            if choice.sign < _GEOMETRIC:
+                continue
+
+            def score(sign: float, j: int = j, others: tuple[_Choice, ...] = choices) -> float:
+                """Return the error with a sign of the j-th drive."""
+                return self._score((*others[:j], _Choice(sign), *others[j + 1 :]))
+
+            bounds = max(_GEOMETRIC, choice.sign - 1), min(last, choice.sign + 1)
+            found = scipy.optimize.minimize_scalar(
+                score, bounds=bounds, method="bounded", options={"xatol": _STEP}
+            )
+            if found.fun < best:
+                choices = (*choices[:j], _Choice(float(found.x)), *choices[j + 1 :])
+                best = float(found.fun)
+        return choices, best
+
+    def _add_terms(
+        self, choices: tuple[_Choice, ...], best: float
+    ) -> tuple[tuple[_Choice, ...], float]:
         """Return the choice with the terms that lower the error, the most useful first."""
         while True:
-            found = []
-            before = self._compute_errors(choice)
-            for j, own in enumerate(self._candidates):
-                for k in range(1, len(own)):
-                    if k in choice[j] or self._is_second_sign(j, choice[j], k):
-                        continue
-                    other = (*choice[:j], (*choice[j], k), *choice[j + 1 :])
+            found: list[tuple[float, tuple[_Choice, ...]]] = []
+            before = self._compute_errors(choices)
+            for j, choice in enumerate(choices):
+                for k in self._list_terms(j, choice):
+                    changed = _Choice(choice.sign, (*choice.terms, k))
+                    other = (*choices[:j], changed, *choices[j + 1 :])
                     errors = self._compute_errors(other)
-                    worse = int(np.count_nonzero(errors > before))
-                    if worse <= len(errors) // 4:
+                    if np.count_nonzero(errors > before) <= errors.size // 4:
                         found.append((float(np.sqrt(errors.sum())), other))
-            error, other = min(found, default=(np.inf, choice))
+            error, other = min(found, default=(np.inf, choices), key=lambda entry: entry[0])
             if error >= (1 - _TERM_GAIN) * best:
-                return choice, best
-            choice, best = other, error
+                return choices, best
+            choices, best = other, error
 
-    def _is_second_sign(self, j: int, chosen: tuple[int, ...], k: int) -> bool:
-        """Return whether a candidate is a sign that cannot be added: a drive has two signs at most, the second one of a
-        larger speed.
+    def _list_terms(self, j: int, choice: _Choice) -> list[int]:
+        """Return the candidates that may be added to a drive's friction.
+
+        A second sign has to have a much larger speed than the first one: with nearly the same speed it only makes up for a
+        smoothing that is a little wrong.
         """
         own = self._candidates[j]
-        if own[k].kind is not Kind.COULOMB:
-            return False
-        signs = [own[i].speed for i in chosen if own[i].kind is Kind.COULOMB]
-        return len(signs) > 1 or own[k].speed <= signs[0]
-
-    def _describe(self, choice: _Choice, best: float, usual: float) -> FrictionSearch:
-        """Return the choice as a record."""
-        chosen = [
-            [own[k] for k in indices] for own, indices in zip(self._candidates, choice, strict=True)
+        second = any(own[k].kind is Kind.COULOMB for k in choice.terms)
+        least = _LEAST_RATIO * self._get_speed(j, choice)
+        return [
+            k
+            for k in range(1, len(own))
+            if k not in choice.terms
+            and (own[k].kind is not Kind.COULOMB or (not second and own[k].speed > least))
         ]
-        signs = [[c.speed for c in own if c.kind is Kind.COULOMB] for own in chosen]
-        kinds = [{c.kind for c in own} for own in chosen]
+
+    def _get_speed(self, j: int, choice: _Choice) -> float:
+        """Return the speed of the smoothing of a drive, rad/s or m/s."""
+        own = self._candidates[j]
+        if choice.sign < _GEOMETRIC:
+            return own[int(choice.sign)].speed
+        return float(own[_GEOMETRIC].speed * _RATIO ** (choice.sign - _GEOMETRIC))
+
+    def _describe(self, choices: Sequence[_Choice], best: float, usual: float) -> FrictionSearch:
+        """Return the choice as a record."""
+        terms = [
+            [own[k] for k in choice.terms]
+            for own, choice in zip(self._candidates, choices, strict=True)
+        ]
+        kinds = [{term.kind for term in own} for own in terms]
+        fading = [[term.speed for term in own if term.kind is Kind.COULOMB] for own in terms]
         return FrictionSearch(
             drives=tuple(drive.name for drive in self._model.drives),
-            smoothing=np.array([own[0] for own in signs]),
-            stribeck_velocity=np.array([own[1] if len(own) > 1 else np.nan for own in signs]),
+            smoothing=np.array([self._get_speed(j, choice) for j, choice in enumerate(choices)]),
+            stribeck_velocity=np.array([own[0] if own else np.nan for own in fading]),
             asymmetry=np.array([Kind.ASYMMETRY in own for own in kinds]),
             quadratic=np.array([Kind.QUADRATIC in own for own in kinds]),
             error=best,
             usual_error=usual,
         )
+
+
+def _interpolate(sign: float) -> tuple[IntArray, FloatArray]:
+    """Return the candidates that a sign is made of, and their weights: cubic interpolation in the logarithm of the speed."""
+    if sign == int(sign):
+        return np.array([int(sign)]), np.ones(1)
+    first = int(np.clip(int(sign) - 1, _GEOMETRIC, len(_SMOOTHINGS) - 3))
+    nodes = first + np.arange(4)
+    weights = [
+        np.prod([(sign - other) / (node - other) for other in nodes if other != node])
+        for node in nodes
+    ]
+    return nodes, np.array(weights)

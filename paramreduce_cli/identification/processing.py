@@ -411,24 +411,24 @@ def _describe_search(
             )
 
 
-def _describe_friction(found: FrictionSearch | None) -> Iterator[str]:
+def _describe_friction(search: FrictionSearch | None) -> Iterator[str]:
     """Yield sentences on the friction that was chosen."""
-    if found is None:
+    if search is None:
         return
     listed = ", ".join(
-        f"{name} {speed:.3g}" for name, speed in zip(found.drives, found.smoothing, strict=True)
+        f"{name} {speed:.3g}" for name, speed in zip(search.drives, search.smoothing, strict=True)
     )
     yield (
         f"Friction: Coulomb friction is smoothed below the speeds {listed} (0: not smoothed). Left-out torques are missed by "
-        f"{format_percent(found.error)}, with the smoothing to begin with by {format_percent(found.usual_error)}."
+        f"{format_percent(search.error)}, with the smoothing to begin with by {format_percent(search.usual_error)}."
     )
     terms = [
-        ("Stribeck", np.isfinite(found.stribeck_velocity)),
-        ("asymmetric viscous", found.asymmetry),
-        ("quadratic", found.quadratic),
+        ("Stribeck", np.isfinite(search.stribeck_velocity)),
+        ("asymmetric viscous", search.asymmetry),
+        ("quadratic", search.quadratic),
     ]
     for term, chosen in terms:
-        names = [name for name, flag in zip(found.drives, chosen, strict=True) if flag]
+        names = [name for name, flag in zip(search.drives, chosen, strict=True) if flag]
         if names:
             yield f"Friction: {term} terms are added to {', '.join(names)}."
 

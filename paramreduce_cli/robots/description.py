@@ -132,11 +132,11 @@ class Robot(Section):
         """Names of the drives whose friction a log decides."""
         return [name for name, drive in self.list_drives().items() if drive.friction == "auto"]
 
-    def apply_friction(self, found: FrictionSearch) -> Robot:
+    def apply_friction(self, search: FrictionSearch) -> Robot:
         """Return the robot with the friction that was found for some of its drives."""
         drives = self.list_drives()
-        for k, name in enumerate(found.drives):
-            drives[name] = drives[name].apply_friction(found, k)
+        for k, name in enumerate(search.drives):
+            drives[name] = drives[name].apply_friction(search, k)
         return self.model_copy(update={"drives": drives})
 
     def list_parameters(self) -> tuple[Parameter, ...]:

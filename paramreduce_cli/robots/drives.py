@@ -79,20 +79,20 @@ class DriveSection(Section):
         known = [kind for kind in DRIVE if getattr(self, kind.key) not in (None, "unknown")]
         return [kind.key for kind in self.get_values() if kind not in known]
 
-    def apply_friction(self, found: FrictionSearch, k: int) -> DriveSection:
+    def apply_friction(self, search: FrictionSearch, k: int) -> DriveSection:
         """Return the section with the k-th friction that was found; terms that are added are unknown."""
         added = {
-            Kind.STRIBECK: bool(np.isfinite(found.stribeck_velocity[k])),
-            Kind.ASYMMETRY: bool(found.asymmetry[k]),
-            Kind.QUADRATIC: bool(found.quadratic[k]),
+            Kind.STRIBECK: bool(np.isfinite(search.stribeck_velocity[k])),
+            Kind.ASYMMETRY: bool(search.asymmetry[k]),
+            Kind.QUADRATIC: bool(search.quadratic[k]),
         }
         kinds = [*_USUAL_FRICTION, *(kind for kind, flag in added.items() if flag)]
         update: dict[str, object] = {
             kind.key: "unknown" for kind in kinds if getattr(self, kind.key) is None
         }
         if added[Kind.STRIBECK]:
-            update["stribeck_velocity"] = float(found.stribeck_velocity[k])
-        update |= {"smoothing": float(found.smoothing[k]), "friction": "given"}
+            update["stribeck_velocity"] = float(search.stribeck_velocity[k])
+        update |= {"smoothing": float(search.smoothing[k]), "friction": "given"}
         return self.model_copy(update=update)
 
     def merge_defaults(self, other: DriveSection | None) -> DriveSection:

@@ -5,11 +5,16 @@ from paramreduce_cli.report.data import ReportData
 from paramreduce_cli.report.page_sections import PageSection, placed
 from paramreduce_cli.texts.table import Table
 
+_RARE = (Kind.STRIBECK, Kind.ASYMMETRY, Kind.QUADRATIC)
+"""Friction that has a column only if there is some."""
+
 
 @placed(PageSection.MECHANISM, 4)
 def drives(data: ReportData) -> Table:
     """Rotors, friction and springs with the weights of the coordinates that they act along."""
     mechanism = data.robot_model.mechanism
+    present = {parameter.kind for parameter in mechanism.parameters}
+    kinds = [kind for kind in DRIVE if kind in present or kind not in _RARE]
     rows = []
     for drive in mechanism.drives:
         columns = mechanism.find_drive_columns(drive)
@@ -19,14 +24,14 @@ def drives(data: ReportData) -> Table:
             )
             if kind in columns
             else ""
-            for kind in DRIVE
+            for kind in kinds
         ]
         sign = _sign(drive) if Kind.COULOMB in columns or Kind.STRIBECK in columns else ""
         if Kind.STRIBECK in columns:
-            sign += f", {drive.stribeck_velocity:g}"
+            sign += f"; Stribeck beyond {drive.stribeck_velocity:g}"
         slack = f"{drive.rest:g}" if Kind.STIFFNESS in columns else ""
         rows.append((drive.name, _describe_motion(mechanism, drive), *cells, sign, slack))
-    header = ("drive", "motion", *(kind.symbol for kind in DRIVE), "sign of speed", "slack at")
+    header = ("drive", "motion", *(kind.symbol for kind in kinds), "sign of speed", "slack at")
     return Table("Rotors, friction and springs", header, tuple(rows))
 
 
