@@ -63,11 +63,11 @@ def apply_filter(x: FloatArray, taps: FloatArray) -> FloatArray:
 
 
 def _extend(x: FloatArray, k: int) -> FloatArray:
-    """Return a column extended by k samples at both ends."""
-    if x.size == 1:
-        return np.repeat(x, 2 * k + 1)
+    """Return signals extended by k samples at both ends, (n_samples + 2 k,) or (n_samples + 2 k, n)."""
+    if len(x) == 1:
+        return np.repeat(x, 2 * k + 1, axis=0)
     while k > 0:  # in steps where the filter is longer than the signal
-        step = min(k, x.size - 1)
+        step = min(k, len(x) - 1)
         x = np.concatenate([2 * x[0] - x[step:0:-1], x, 2 * x[-1] - x[-2 : -step - 2 : -1]])
         k -= step
     return x
@@ -112,7 +112,7 @@ def filter_outputs(rows: FloatArray, taps: FloatArray, outputs: np.ndarray) -> F
         (n_outputs, n)
     """
     k = taps.size // 2
-    extended = np.column_stack([_extend(column, k) for column in rows.T])
+    extended = _extend(rows, k)
     parts = [
         filter_samples(extended[some[0] : some[-1] + 2 * k + 1], int(some[0]) - k, taps, some)
         for some in np.split(outputs, range(_OUTPUTS_AT_ONCE, outputs.size, _OUTPUTS_AT_ONCE))
