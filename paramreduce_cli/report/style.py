@@ -147,7 +147,9 @@ def choose_joint_style(j: int) -> tuple[str, str]:
 
 
 def place_legend_beside(axes: Axes) -> None:
-    """Place a legend where it covers nothing: on the right, or below in a narrow figure."""
+    """Place a legend where it covers nothing: on the right, or below in a narrow figure; none without labels."""
+    if not axes.get_legend_handles_labels()[1]:
+        return
     if not _is_narrow():
         axes.legend(fontsize="small", loc="center left", bbox_to_anchor=(1.0, 0.5))
         return
