@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from paramreduce_cli.identification.estimation import LinearFit
+from paramreduce_cli.identification.joint_hypotheses import hint_at_joint_frames
 from paramreduce_cli.identification.residual_hints import (
     find_residual_hints,
     hint_at_negative_friction,
@@ -75,6 +76,16 @@ def find_hints(
     wrong = gravity or hint_at_sign(
         looked_at.exact, looked_at.iterate_mirrored(), looked_at.tau, fitted.deviation, names
     )
+    if not wrong and full.train > _NOTABLE and mechanism.loops is None:
+        wrong = [
+            *hint_at_joint_frames(
+                looked_at.dynamics,
+                looked_at.states,
+                looked_at.tau,
+                np.isfinite(fitted.deviation),
+                names,
+            )
+        ]
     if wrong:  # what else is seen follows from that
         return [*_hint_at_large_errors(full), *wrong]
     return [
