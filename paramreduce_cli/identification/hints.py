@@ -42,6 +42,8 @@ _BESIDE = 0.003
 parameters fit noise that bodies cannot (0.0016 on the Panda's own log with a cut-off from the spectrum; 0.007 with other kinematics)."""
 _NOTABLE = 0.1
 """Share of the torques from which on that is worth a word."""
+_SEARCHED = 0.05
+"""Share of the torques from which on other zeros, directions and orders of joints are tried."""
 _FRICTION = (Kind.COULOMB, Kind.VISCOUS)
 _ACROSS = 1e-6
 """Share of gravity below which an axis counts as level."""
@@ -73,19 +75,17 @@ def find_hints(
     )
     mechanism = model.mechanism
     names = mechanism.coordinate_names
-    wrong = gravity or hint_at_sign(
+    wrong = gravity
+    if not wrong and full.train > _SEARCHED and mechanism.loops is None:
+        measured = np.isfinite(fitted.deviation)
+        wrong = list(
+            hint_at_joint_frames(
+                looked_at.dynamics, looked_at.states, looked_at.tau, measured, names
+            )
+        )
+    wrong = wrong or hint_at_sign(
         looked_at.exact, looked_at.iterate_mirrored(), looked_at.tau, fitted.deviation, names
     )
-    if not wrong and full.train > _NOTABLE and mechanism.loops is None:
-        wrong = [
-            *hint_at_joint_frames(
-                looked_at.dynamics,
-                looked_at.states,
-                looked_at.tau,
-                np.isfinite(fitted.deviation),
-                names,
-            )
-        ]
     if wrong:  # what else is seen follows from that
         return [*_hint_at_large_errors(full), *wrong]
     return [
