@@ -30,6 +30,8 @@ _VISIBLE = 1e-3
 _MOST = 4
 _GAIN = 0.08
 """Relative error of a torque's scale that is worth a word."""
+_LARGEST_SCALE = 5.0
+"""Largest wrong scale of one joint: what is farther off, or negative, comes from few samples of small torques."""
 _DELAY = 0.15
 """Delay of a sampling step, likewise."""
 _TILT = 1.0
@@ -236,11 +238,12 @@ def _make_scale_hint(name: str) -> Callable[[float, float], str | None]:
     """Return a function that words the hint at a wrong scale of torques, or None for small errors."""
 
     def word_hint(coefficient: float, fraction: float) -> str | None:
-        """Return the hint, or None for a small error of scale."""
-        if abs(coefficient) < _GAIN:
+        """Return the hint; None for a small error of scale, and for a scale that no torque constant explains."""
+        scale = 1 + coefficient
+        if abs(coefficient) < _GAIN or not 1 / _LARGEST_SCALE <= scale <= _LARGEST_SCALE:
             return None
         return (
-            f"Torques of {name} are {1 + coefficient:.3g} times what those of the other joints let expect: a "
+            f"Torques of {name} are {scale:.3g} times what those of the other joints let expect: a "
             "wrong torque constant or gear ratio?"
         )
 
