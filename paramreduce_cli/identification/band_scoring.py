@@ -188,7 +188,8 @@ def score(bands: Sequence[Band], fitted: int, scored: int, measured: BoolArray) 
     fitted, scored = min(fitted, len(bands) - 1), min(scored, len(bands) - 1)
     parameters = cross_fit(bands[fitted], measured)
     band = bands[scored]
-    return float(np.sqrt(band.compute_left(parameters, measured) / band.compute_power(measured)))
+    power = max(band.compute_power(measured), 1e-300)
+    return float(np.sqrt(band.compute_left(parameters, measured) / power))
 
 
 def cross_fit(band: Band, measured: BoolArray) -> list[FloatArray]:

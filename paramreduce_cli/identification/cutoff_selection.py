@@ -34,6 +34,10 @@ _MOTION_POWER = 0.999
 """Share of the positions' power at frequencies up to that of the motion."""
 _LEAST_KEPT = 0.8
 """Share of the samples that has to keep all neighbours of a low-pass of positions."""
+_HIGHEST = 0.4
+"""Highest frequency of the grid, a share of the rate."""
+_WITHOUT_LOW_PASS = 0.3
+"""Highest state cut-off, a share of the rate, from which on no low-pass at all is tried too."""
 _UNEXPLAINED = 0.5
 """Share of the power of a band that the model may leave."""
 _HOPELESS = 1.5
@@ -69,51 +73,62 @@ def select_cutoffs(
     bands = _make_grid(motion, rate, _N_BANDS)
     if given[1] is not None and np.isfinite(given[1]):
         bands = np.unique([*bands, given[1]])
-    states = _make_grid(motion, rate, _N_STATES)
-    if states[-1] > 0.3 * rate:
-        states = np.append(states, np.inf)
-    if given[0] is not None:
-        states = np.array([given[0]])
-    edges = [_find_common_edges(pieces, rate, states[k:]) for k in range(states.size)]
-    whole = _count_used(pieces, np.zeros(len(pieces)))
-    first = next(
-        (k for k, edge in enumerate(edges) if _count_used(pieces, edge) >= _LEAST_KEPT * whole),
-        states.size - 1,
-    )
-    states, edge = states[first:], edges[first]
+    states, edges = _list_states(pieces, rate, motion, given[0])
     tried: list[list[Band]] = []
     errors: list[float] = []
     unexplained = np.zeros(0)
-    for state in states:
-        rows = compute_rows(
-            pieces, rate, float(state), float(bands[-1]), compute_columns, edge, n_folds
-        )
+    for state in states.tolist():
+        rows = compute_rows(pieces, rate, state, float(bands[-1]), compute_columns, edges, n_folds)
         if rows is None:
             return None
-        own = [factorise_band(rows, float(band), n_folds) for band in bands]
-        tried.append(own)
-        errors.append(score(own, 1, 1, measured))
+        factorised = [factorise_band(rows, float(band), n_folds) for band in bands]
+        tried.append(factorised)
+        errors.append(score(factorised, 1, 1, measured))
         if errors[-1] == min(errors):
-            parameters = cross_fit(own[min(1, len(own) - 1)], measured)
+            parameters = cross_fit(factorised[min(1, bands.size - 1)], measured)
             unexplained = _compute_unexplained(rows, bands, parameters, measured)
         if min(errors[-2:]) > _HOPELESS * min(errors):
             break
-    states = states[: len(tried)]
     scored = _find_explained(unexplained)
-    state_errors = np.array([score(own, scored, scored, measured) for own in tried])
+    state_errors = np.array([score(one, scored, scored, measured) for one in tried])
     state = _choose_state(state_errors)
     torque_errors = np.array([score(tried[state], k, scored, measured) for k in range(bands.size)])
-    torque = float(bands[scored]) if given[1] is None else given[1]
     return CutoffSearch(
         state=float(states[state]),
-        torque=torque,
+        torque=float(bands[scored]) if given[1] is None else given[1],
         scored=float(bands[scored]),
-        states=states,
+        states=states[: len(tried)],
         state_errors=state_errors,
         bands=bands,
         torque_errors=torque_errors,
         unexplained=unexplained,
     )
+
+
+def _list_states(
+    pieces: Sequence[Piece], rate: float, motion: float, given: float | None
+) -> tuple[FloatArray, FloatArray]:
+    """Return the state cut-offs to be tried, Hz, and the time at the ends of each piece that none of them may use, s.
+
+    Cut-offs whose low-pass is so long that few samples would be left are not tried.
+
+    Args:
+        pieces: Training pieces as recorded.
+        rate: Recorded samples per second.
+        motion: Frequency of the motion, Hz.
+        given: State cut-off that the config gives, Hz; None for none.
+    """
+    states = _make_grid(motion, rate, _N_STATES)
+    if states[-1] > _WITHOUT_LOW_PASS * rate:
+        states = np.append(states, np.inf)
+    if given is not None:
+        states = np.array([given])
+    whole = _count_used(pieces, np.zeros(len(pieces)))
+    while True:
+        edges = np.array([compute_edge(piece, rate, float(states[0])) for piece in pieces])
+        if states.size == 1 or _count_used(pieces, edges) >= _LEAST_KEPT * whole:
+            return states, edges
+        states = states[1:]
 
 
 def find_motion_frequency(spectra: Spectra) -> float:
@@ -129,12 +144,7 @@ def find_motion_frequency(spectra: Spectra) -> float:
 def _make_grid(first: float, rate: float, count: int) -> FloatArray:
     """Return a geometric grid of frequencies well below half of the rate, at least one, Hz."""
     grid = np.array([first * _RATIO**k for k in range(count)])
-    return grid[: max(1, int(np.sum(grid < 0.4 * rate)))]
-
-
-def _find_common_edges(pieces: Sequence[Piece], rate: float, states: FloatArray) -> FloatArray:
-    """Return the time at the ends of each piece that the longest low-pass takes, s, (n_pieces,)."""
-    return np.array([compute_edge(piece, rate, float(states.min())) for piece in pieces])
+    return grid[: max(1, int(np.sum(grid < _HIGHEST * rate)))]
 
 
 def _count_used(pieces: Sequence[Piece], edges: FloatArray) -> int:
