@@ -24,7 +24,7 @@ _PAIRS_FROM = 0.05
 
 @dataclass(frozen=True)
 class JointFrames:
-    """How the joints of a log are related to those of the model.
+    """A relation of the joints of a log to those of the model.
 
     Attributes:
         order: Index of the log's joint behind each joint, (n_dof,).
