@@ -10,7 +10,12 @@ import numpy as np
 
 from paramreduce_cli.identification import filters
 from paramreduce_cli.identification.data_split import Piece
-from paramreduce_cli.identification.state_estimation import Cutoffs, cut_ends, estimate_states
+from paramreduce_cli.identification.state_estimation import (
+    PER_STATE_CUTOFF,
+    Cutoffs,
+    cut_ends,
+    estimate_states,
+)
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.multibody.loops.coordinates import Coordinates
 from paramreduce_cli.multibody.noise import estimate_joint_noise
@@ -23,8 +28,6 @@ ComputeColumns = Callable[[FloatArray, FloatArray, FloatArray], FloatArray]
 
 _PER_BAND = 8
 """Samples per period of the highest band that the observation matrix is computed in."""
-_PER_STATE_CUTOFF = 6
-"""Samples per period of the state cut-off."""
 _USED_PER_BAND = 10
 """Samples per period of a band that are fitted."""
 _MOST_SAMPLES = 8_000
@@ -123,7 +126,7 @@ def compute_rows(
         edges: Time at the ends of each piece that is not used, s.
         n_folds: Number of folds.
     """
-    needed = max(_PER_BAND * highest, _PER_STATE_CUTOFF * state if np.isfinite(state) else rate)
+    needed = max(_PER_BAND * highest, PER_STATE_CUTOFF * state if np.isfinite(state) else rate)
     decimation = max(1, int(rate / needed + 1e-9))
     ready = [
         cut_ends(estimate_states(piece, rate, Cutoffs(state, highest), decimation), edge)

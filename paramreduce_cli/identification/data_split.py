@@ -7,6 +7,8 @@ import numpy as np
 from paramreduce_cli.config.log_settings import LogSection
 from paramreduce_cli.identification.signals import Signals
 
+UNUSED = -1
+"""Fold of samples that only serve filters."""
 STILL = 2e-3
 """Share of a joint's range within which it stands still."""
 _ROUNDING = 1e-9

@@ -24,6 +24,8 @@ _IN_A_ROW = 5
 """Frequencies below that, one after the other, that end the motion's band."""
 _SEGMENTS = 4
 """Segments of the log in a spectrum: the longer, the finer in frequency."""
+ANTI_ALIAS = 0.4
+"""Cut-off of the low-pass before a lower rate, a share of that rate."""
 _OUTPUTS_AT_ONCE = 64
 """Filtered samples that are computed as one product of matrices."""
 _DERIVATIVE = np.array([1 / 280, -4 / 105, 1 / 5, -4 / 5, 0.0, 4 / 5, -1 / 5, 4 / 105, -1 / 280])

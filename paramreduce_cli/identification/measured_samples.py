@@ -9,7 +9,7 @@ from operator import attrgetter
 import numpy as np
 
 from paramreduce_cli.identification import filters
-from paramreduce_cli.identification.processing import UNUSED
+from paramreduce_cli.identification.data_split import UNUSED
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.multibody.observation import (
     BLOCK_SAMPLES,

@@ -1,7 +1,7 @@
 """Processing of logs: cleaning, low-pass, differentiation, split into training and held-out motions."""
 
 import itertools
-from collections.abc import Collection, Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -11,7 +11,7 @@ from paramreduce_cli.errors import ConfigError, DataError
 from paramreduce_cli.identification import filters
 from paramreduce_cli.identification.band_scoring import ComputeColumns
 from paramreduce_cli.identification.cutoff_selection import select_cutoffs
-from paramreduce_cli.identification.data_split import Piece, split_pieces, trim_files
+from paramreduce_cli.identification.data_split import UNUSED, Piece, split_pieces, trim_files
 from paramreduce_cli.identification.friction_selection import FrictionModel, select_friction
 from paramreduce_cli.identification.log_checks import find_log_warnings
 from paramreduce_cli.identification.log_signals import (
@@ -23,6 +23,14 @@ from paramreduce_cli.identification.log_signals import (
 )
 from paramreduce_cli.identification.outliers import replace_outliers
 from paramreduce_cli.identification.position_jumps import find_position_jumps, name_rows
+from paramreduce_cli.identification.processing_steps import (
+    describe_friction,
+    describe_low_pass,
+    describe_outliers,
+    describe_search,
+    describe_split,
+    describe_states,
+)
 from paramreduce_cli.identification.signals import (
     Signals,
     change_rate,
@@ -38,7 +46,6 @@ from paramreduce_cli.records import (
     BoolArray,
     CutoffSearch,
     FloatArray,
-    FrictionSearch,
     IntArray,
     MeasuredLog,
     MeasuredMotions,
@@ -49,10 +56,7 @@ from paramreduce_cli.records import (
     Spectra,
 )
 from paramreduce_cli.resources.scratch import stack_rows
-from paramreduce_cli.texts import format_percent
 
-UNUSED = -1
-"""Fold of samples that only serve filters."""
 _USED_PER_CUTOFF = 10
 """Samples per period of the torque cut-off that are used."""
 _FEWEST_USED = 20
@@ -135,20 +139,20 @@ def process_logs(
     cutoffs = _choose_cutoffs(given, spectra, search, steps)
     if search is not None and friction is not None:
         shape = select_friction(raw, rate, search, friction, measured, section.folds)
-        steps += _describe_friction(shape)
+        steps += describe_friction(shape)
     thin = choose_decimation(cutoffs, rate, section.rate or rate)
 
     def ready(pieces: list[Piece]) -> list[Piece]:
         """Nothing of one piece is in another: they are low-passed apart."""
         return [estimate_states(piece, rate, cutoffs, thin) for piece in pieces]
 
-    steps.append(_describe_states(longest, thin, rate / thin))
+    steps.append(describe_states(longest, thin, rate / thin))
     begin(2)
     made = ready(raw)
     made_tested = ready(tested_raw)
     learned, tested = _join_pieces(made, section.folds), _join_pieces(made_tested, 1)
     _check_enough(learned, tested)
-    steps.append(_describe_split(learned, tested, section, rate / thin))
+    steps.append(describe_split(learned, tested, section, rate / thin))
     begin(3)
     noise = _estimate_noise(learned, cutoffs, rate / thin)
     used = learned.fold != UNUSED
@@ -235,7 +239,7 @@ def _read_files(
         steps.append(f"{source}: {rows} rows, {duration:.4g} s at {rate:.5g} Hz.")
         steps += messages
         outliers = replace_outliers(pieces) if section.outliers == "replace" else {}
-        steps += _describe_outliers(outliers, names)
+        steps += describe_outliers(outliers, names)
         files.rate = files.rate or rate
         if abs(rate - files.rate) > _SAME_RATE * files.rate:
             pieces = [change_rate(piece, rate, files.rate) for piece in pieces]
@@ -375,73 +379,15 @@ def _choose_cutoffs(
 ) -> Cutoffs:
     """Return the cut-off frequencies that the config gives, that a search has found, or that the spectrum suggests."""
     if search is not None:
-        steps += _describe_search(search, given)
+        steps += describe_search(search, given)
         return Cutoffs(search.state, search.torque)
     band = filters.find_motion_band(spectra.frequency, spectra.velocity)
     state, torque = (band if value is None else value for value in given)
     steps.append(
-        f"Speeds stand out of their noise up to {band:.3g} Hz. Positions and speeds: {_describe_low_pass(state)}; "
-        f"torques and observation matrix: {_describe_low_pass(torque)}."
+        f"Speeds stand out of their noise up to {band:.3g} Hz. Positions and speeds: {describe_low_pass(state)}; "
+        f"torques and observation matrix: {describe_low_pass(torque)}."
     )
     return Cutoffs(state, torque)
-
-
-def _describe_search(
-    search: CutoffSearch, given: tuple[float | None, float | None]
-) -> Iterator[str]:
-    """Yield sentences on the chosen cut-off frequencies and their neighbours."""
-    yield (
-        f"Up to {search.scored:.3g} Hz the model explains most of the torques' power. Positions and speeds: "
-        f"{_describe_low_pass(search.state)}; torques and observation matrix: {_describe_low_pass(search.torque)}."
-    )
-    for value, name, cutoffs, errors, chosen in (
-        (given[0], "state", search.states, search.state_errors, search.state),
-        (given[1], "torque", search.bands, search.torque_errors, search.torque),
-    ):
-        if value is None:
-            k = int(np.flatnonzero(cutoffs == chosen)[0])
-            shown = sorted({0, max(0, k - 1), k, min(k + 1, cutoffs.size - 1), cutoffs.size - 1})
-            listed = ", ".join(
-                f"{format_percent(float(errors[i]))} {_describe_cutoff(float(cutoffs[i]))}"
-                for i in shown
-            )
-            yield (
-                f"Cross-validation within the training part compares {cutoffs.size} {name} cut-offs; torques up to "
-                f"{search.scored:.3g} Hz are missed by {listed}."
-            )
-
-
-def _describe_friction(search: FrictionSearch | None) -> Iterator[str]:
-    """Yield sentences on the friction that was chosen."""
-    if search is None:
-        return
-    listed = ", ".join(
-        f"{name} {speed:.3g}" for name, speed in zip(search.drives, search.smoothing, strict=True)
-    )
-    yield (
-        f"Friction: Coulomb friction is smoothed below the speeds {listed} (0: not smoothed). Left-out torques are missed by "
-        f"{format_percent(search.error)}, with the smoothing to begin with by {format_percent(search.usual_error)}."
-    )
-    terms = [
-        ("Stribeck", np.isfinite(search.stribeck_velocity)),
-        ("asymmetric viscous", search.asymmetry),
-        ("quadratic", search.quadratic),
-    ]
-    for term, chosen in terms:
-        names = [name for name, flag in zip(search.drives, chosen, strict=True) if flag]
-        if names:
-            yield f"Friction: {term} terms are added to {', '.join(names)}."
-
-
-def _describe_cutoff(cutoff: float) -> str:
-    return "without a low-pass" if np.isinf(cutoff) else f"at {cutoff:.3g} Hz"
-
-
-def _describe_low_pass(cutoff: float) -> str:
-    """Describe a low-pass filter; an infinite cut-off means no filter."""
-    if np.isinf(cutoff):
-        return "as recorded"
-    return f"zero-phase low-pass at {cutoff:.3g} Hz"
 
 
 def _choose_output_rate(section: LogSection, cutoffs: Cutoffs, rate: float) -> float:
@@ -486,48 +432,10 @@ def _join_pieces(pieces: list[Piece], folds: int) -> MeasuredMotions:
     return MeasuredMotions(time=time, **joined, piece=number, fold=np.concatenate(fold_of))
 
 
-def _describe_outliers(outliers: Outliers, names: Sequence[str]) -> Iterator[str]:
-    """Yield a sentence on replaced outliers, if there are any."""
-    if not outliers:
-        return
-    listed = ", ".join(
-        f"{len(times)} in the {signal} of {names[j]} (the first at {times[0]:.6g} s)"
-        for (signal, j), times in outliers.items()
-    )
-    count = sum(map(len, outliers.values()))
-    yield f"{count} outliers are replaced by what lies between their neighbours: {listed}."
-
-
 def _check_enough(learned: MeasuredMotions, tested: MeasuredMotions) -> None:
     for what, motions in (("to learn from", learned), ("held out", tested)):
         if np.count_nonzero(motions.fold != UNUSED) < _FEWEST_USED:
             raise DataError(_TOO_SHORT.format(what))
-
-
-def _describe_states(piece: Signals, thin: int, rate: float) -> str:
-    """Return a sentence on differentiation and decimation."""
-    made = [
-        *([] if piece.dz is not None else ["speeds"]),
-        *([] if piece.ddz is not None else ["accelerations"]),
-    ]
-    text = f"Differentiated: {' and '.join(made)}. " if made else ""
-    kept = "All samples are kept" if thin == 1 else f"One of {thin} samples is kept"
-    return f"{text}{kept}, {rate:.5g} Hz."
-
-
-def _describe_split(
-    learned: MeasuredMotions, tested: MeasuredMotions, section: LogSection, rate: float
-) -> str:
-    """Return a sentence on the durations of training and held-out motions."""
-    one, two = (np.count_nonzero(m.fold != UNUSED) / rate for m in (learned, tested))
-    cut = (learned.time.size + tested.time.size) / rate - one - two
-    how = (
-        "by file"
-        if section.held_out_files
-        else f"the last {100 * section.held_out_fraction:.3g} % of each file"
-    )
-    text = f"{one:.4g} s are learned from, in {section.folds} folds, {two:.4g} s held out ({how})"
-    return f"{text}; {cut:.3g} s at the ends are cut off." if cut * rate >= 1 else f"{text}."
 
 
 def _estimate_noise(learned: MeasuredMotions, cutoffs: Cutoffs, rate: float) -> FloatArray:

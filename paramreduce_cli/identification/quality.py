@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from paramreduce_cli.identification.data_split import UNUSED
 from paramreduce_cli.identification.measured_samples import LoggedSet
-from paramreduce_cli.identification.processing import UNUSED
 from paramreduce_cli.multibody.base_parameters import choose_base, find_affecting_parameters
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.multibody.observation import combine_factors

@@ -34,8 +34,6 @@ _AT_ONCE = 10_000
 """Rows."""
 _LARGEST = 1e30
 """More than any signal in any unit, nanoseconds since 1970 included; powers of it can be computed with."""
-_ANTI_ALIAS = 0.4
-"""Cut-off of the low-pass before a lower rate, a share of that rate."""
 _MOST_SHOWN = 12
 """Names of columns in a message."""
 
@@ -319,7 +317,7 @@ def change_rate(signals: Signals, rate: float, new_rate: float) -> Signals:
         rate: Samples per second of the signals.
         new_rate: Samples per second of the result.
     """
-    taps = filters.design_low_pass(_ANTI_ALIAS * new_rate, rate)
+    taps = filters.design_low_pass(filters.ANTI_ALIAS * new_rate, rate)
 
     def apply(values: FloatArray | None) -> FloatArray | None:
         return None if values is None else filters.apply_filter(values, taps)

@@ -12,10 +12,8 @@ from paramreduce_cli.resources.scratch import allocate_matrix
 
 _PER_TORQUE_CUTOFF = 40
 """Samples per period of the torque cut-off in which the observation matrix is filtered."""
-_PER_STATE_CUTOFF = 6
+PER_STATE_CUTOFF = 6
 """Samples per period of the state cut-off that motions are kept with."""
-_ANTI_ALIAS = 0.4
-"""Cut-off of the low-pass before decimation, a share of the rate after it."""
 _LARGEST_EDGE = 0.125
 """Largest share of a piece that is left out at each of its ends."""
 
@@ -39,7 +37,7 @@ def choose_decimation(cutoffs: Cutoffs, rate: float, without_low_pass: float) ->
     if np.isfinite(cutoffs.torque):
         needed = _PER_TORQUE_CUTOFF * cutoffs.torque
         if np.isfinite(cutoffs.state):
-            needed = max(needed, _PER_STATE_CUTOFF * cutoffs.state)
+            needed = max(needed, PER_STATE_CUTOFF * cutoffs.state)
     else:
         needed = without_low_pass
     return max(1, int(rate / needed + 1e-9))
@@ -61,7 +59,7 @@ def estimate_states(piece: Piece, rate: float, cutoffs: Cutoffs, decimation: int
     state = filters.design_low_pass(cutoffs.state, rate)
     torque = np.ones(1)
     if decimation > 1 and np.isfinite(cutoffs.torque):
-        torque = filters.design_low_pass(_ANTI_ALIAS * rate / decimation, rate)
+        torque = filters.design_low_pass(filters.ANTI_ALIAS * rate / decimation, rate)
     known = s.dz is not None and s.ddz is not None
     if known and decimation == state.size == torque.size == 1:
         return piece

@@ -7,8 +7,9 @@ from paramreduce_cli.artifacts.store import Store, load_file
 from paramreduce_cli.config import load_config
 from paramreduce_cli.config.log_settings import LogSection
 from paramreduce_cli.identification import measured_samples
+from paramreduce_cli.identification.data_split import UNUSED
 from paramreduce_cli.identification.measured_samples import LoggedSet
-from paramreduce_cli.identification.processing import UNUSED, process_logs
+from paramreduce_cli.identification.processing import process_logs
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.multibody.observation import combine_factors
 from paramreduce_cli.records import MeasuredLog, Model, RawLog, RawLogs

@@ -8,9 +8,9 @@ from simulated_logs import two_link_log
 
 from paramreduce_cli.config.log_settings import LogSection
 from paramreduce_cli.errors import ConfigError, DataError
-from paramreduce_cli.identification.data_split import Piece
+from paramreduce_cli.identification.data_split import UNUSED, Piece
 from paramreduce_cli.identification.log_signals import Place, find_longest
-from paramreduce_cli.identification.processing import UNUSED, process_logs
+from paramreduce_cli.identification.processing import process_logs
 from paramreduce_cli.identification.signals import Signals
 from paramreduce_cli.records import RawLog, RawLogs
 

@@ -4,7 +4,8 @@ from simulated_logs import two_link_log
 
 from paramreduce_cli.config.log_settings import LogSection
 from paramreduce_cli.identification import filters
-from paramreduce_cli.identification.processing import UNUSED, process_logs
+from paramreduce_cli.identification.data_split import UNUSED
+from paramreduce_cli.identification.processing import process_logs
 from paramreduce_cli.identification.quality import estimate_noise_floor
 from paramreduce_cli.records import RawLog, RawLogs
 
