@@ -4,7 +4,7 @@ import itertools
 import re
 from collections.abc import Collection, Mapping, Sequence
 
-from paramreduce_cli.config.column_headings import split_unit
+from paramreduce_cli.config.column_headings import CURRENTS, read_units, split_unit
 from paramreduce_cli.config.log_settings import NUMBER
 from paramreduce_cli.errors import ConfigError
 
@@ -109,12 +109,12 @@ def _restore_units(
 
 def hold_currents(columns: str | Sequence[str]) -> bool:
     """Return whether columns of torques are currents by their names or units."""
+    if read_units({"torque": columns}).get("torque") in CURRENTS:
+        return True
     listed = [columns] if isinstance(columns, str) else columns
-    plain = [split_unit(name) for name in listed]
-    by_unit = any(unit.lower() in ("a", "ma") for _, unit in plain)
-    return by_unit or all(
-        any(_is_word(part, (word,)) for part in _split_at_number(name) for word in _CURRENTS)
-        for name, _ in plain
+    return all(
+        any(_is_word(part, _CURRENTS) for part in _split_at_number(split_unit(name)[0]))
+        for name in listed
     )
 
 

@@ -203,6 +203,8 @@ def test_a_config_is_written_for_what_is_recognised(tmp_path, invoke, monkeypatc
     write_log(tmp_path / "states.csv", {"t": log["t"], "q1": log["q1"], "q2": log["q2"]})
     currents = {"t": log["t"][::2], "i1 [A]": log["tau1"][::2], "i2 [A]": log["tau2"][::2]}
     write_log(tmp_path / "drives.csv", currents)
+    mixed = {"t": log["t"], "q1 [deg]": log["q1"], "q2 [rad]": log["q2"]}
+    write_log(tmp_path / "mixed.csv", mixed | {f"tau{j}": log[f"tau{j}"] for j in (1, 2)})
     write_log(tmp_path / "odd.csv", {"q1": log["q1"], "q2": log["q2"], "foo": log["tau1"]})
     (tmp_path / "arm.urdf").write_text(TWO_JOINTS)
     invoke("init", "arm.urdf", "--log", "states.csv", "--log", "drives.csv", "--output", "a.yaml")
@@ -211,6 +213,8 @@ def test_a_config_is_written_for_what_is_recognised(tmp_path, invoke, monkeypatc
     assert "torque_constants: TODO" in text
     error = invoke("process-log", "a.yaml", code=2).err
     assert "sampling.log.torque_constants: 'TODO' is not a number" in " ".join(error.split())
+    said = invoke("init", "arm.urdf", "--log", "mixed.csv", "--output", "c.yaml").out
+    assert "position: the units in the headings are unknown or differ" in " ".join(said.split())
     said = invoke("init", "arm.urdf", "--log", "odd.csv", "--output", "b.yaml").out
     assert "time, torque: not recognised among the columns q1, q2, foo" in " ".join(said.split())
     error = invoke("process-log", "b.yaml", settings=["sampling.log.recorded_rate=200"], code=2).err

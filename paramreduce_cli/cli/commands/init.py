@@ -13,7 +13,7 @@ import click
 
 from paramreduce_cli.cli.example_command import ExampleCommand
 from paramreduce_cli.cli.terminal import say
-from paramreduce_cli.config.column_headings import read_units
+from paramreduce_cli.config.column_headings import read_units, split_unit
 from paramreduce_cli.config.column_matching import match_columns, suggest_locking
 from paramreduce_cli.config.examples import copy_example, make_exists_error
 from paramreduce_cli.config.loading import load_config
@@ -194,6 +194,11 @@ def _make_log_section(
     for key, value in columns.items():
         shown = value if isinstance(value, str) else ", ".join(value)
         say(f"- {key}: {shown}{f', in {units[key]}' if key in units else ''}.")
+        headings = [value] if isinstance(value, str) else value
+        if key not in units and any(split_unit(heading)[1] for heading in headings):
+            say(
+                f"- {key}: the units in the headings are unknown or differ; check `units` under sampling.log."
+            )
     missing = [key for key in ("time", "position", "torque") if key not in columns]
     if missing:
         say(
