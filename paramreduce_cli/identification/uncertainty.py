@@ -9,7 +9,6 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import scipy  # its signal takes half a second to load, so only when it is used
 from scipy import fft, linalg
 
 from paramreduce_cli.records import FloatArray
@@ -19,8 +18,6 @@ _ORDERS = (0, 1, 2, 3, 4, 6, 8, 12, 16)
 _NOTHING = 1e-300
 _HALVINGS = 6
 _DEFINITE = 1e-9
-_SETTLING = 1000
-"""Samples after which drawn noise has forgotten how it began."""
 
 
 @dataclass(frozen=True)
@@ -37,13 +34,6 @@ class ColouredNoise:
         response = fft.rfft(np.concatenate([[1.0], -self.coefficients]), n)
         power: FloatArray = self.variance / np.abs(response) ** 2
         return power
-
-    def simulate(self, n: int, rng: np.random.Generator) -> FloatArray:
-        """Return simulated noise, (n,)."""
-        white = np.sqrt(self.variance) * rng.standard_normal(n + _SETTLING)
-        denominator = np.concatenate([[1.0], -self.coefficients])
-        result: FloatArray = scipy.signal.lfilter([1.0], denominator, white)[_SETTLING:]
-        return result
 
 
 def estimate_autocovariance(segments: Sequence[FloatArray]) -> FloatArray:
@@ -65,7 +55,7 @@ def add_lost_noise(seen: FloatArray, lost: FloatArray) -> FloatArray:
         lost: Autocovariances to add.
     """
     for _ in range(_HALVINGS):
-        result: FloatArray = seen + lost
+        result: FloatArray = seen + lost[: seen.size]
         if np.linalg.eigvalsh(linalg.toeplitz(result))[0] > _DEFINITE * result[0] > 0:
             return result
         lost = lost / 2
@@ -125,6 +115,68 @@ def compute_score_covariance(
             total = part if total is None else total + part
     assert total is not None
     return total
+
+
+def compute_absorbed_noise(
+    segments: Sequence[FloatArray],
+    noise: Sequence[ColouredNoise],
+    weights: FloatArray,
+    inverse: FloatArray,
+    covariance: FloatArray,
+) -> FloatArray:
+    """Return the expected autocovariances of the noise minus those of the residuals of a weighted fit, (n_dof, n_lags).
+
+    Args:
+        segments: Columns of uninterrupted motions, (n_samples, n_dof, p) each.
+        noise: Noise of each joint.
+        weights: Squares of the factors that rows of each joint are multiplied by, (n_dof,).
+        inverse: Inverse of X' X of the weighted rows, (p, p).
+        covariance: Covariance of the fitted parameters, (p, p).
+    """
+    n_samples = sum(len(X) for X in segments)
+    result = np.zeros((len(noise), 1 + _ORDERS[-1]))
+    for X in segments:
+        size = X.shape[0]
+        n = fft.next_fast_len(2 * size, real=True)
+        for j in np.flatnonzero(weights).tolist():
+            transformed = fft.rfft(X[:, j], n, axis=0)
+            power = noise[j].compute_spectrum(n) * weights[j]
+            # Covariance of each sample of the noise with the right side of the normal equations.
+            joint = fft.irfft(transformed * power[:, None], n, axis=0)[:size]
+            lost = 2 * fft.rfft(joint, n, axis=0) @ inverse - transformed @ covariance
+            spectrum = np.sum(lost * transformed.conj(), axis=1).real
+            lags = fft.irfft(spectrum, n)[: min(size, result.shape[1])]
+            result[j, : lags.size] += lags / n_samples
+    return result
+
+
+def count_degrees_of_freedom(
+    segments: Iterable[FloatArray],
+    noise: Sequence[ColouredNoise],
+    weights: FloatArray,
+    inverse: FloatArray,
+) -> FloatArray:
+    """Return the degrees of freedom of each parameter's variance, (p,) [Satterthwaite1946].
+
+    A variance is a sum over frequencies and joints of the noise's power at which the parameter is told from the others;
+    the power at one frequency has two degrees of freedom.
+
+    Args:
+        segments: Columns of uninterrupted motions, (n_samples, n_dof, p) each.
+        noise: Noise of each joint.
+        weights: Squares of the factors that rows of each joint are multiplied by, (n_dof,).
+        inverse: Inverse of X' X of the weighted rows, (p, p).
+    """
+    total, squares = np.zeros(len(inverse)), np.zeros(len(inverse))
+    for X in segments:
+        n = fft.next_fast_len(2 * X.shape[0], real=True)
+        for j in np.flatnonzero(weights).tolist():
+            power = noise[j].compute_spectrum(n) * weights[j] ** 2
+            parts = np.abs(fft.rfft(X[:, j], n, axis=0) @ inverse) ** 2 * power[:, None] / n
+            total += parts.sum(axis=0)
+            squares += np.sum(parts**2, axis=0)
+    # The transform has twice as many frequencies as the samples tell apart, which cancels the two.
+    return np.maximum(1.0, total**2 / np.maximum(squares, _NOTHING))
 
 
 def count_effective_samples(noise: ColouredNoise, n_samples: int) -> float:

@@ -202,6 +202,8 @@ class Estimate:
     """(n,)"""
     deviations: FloatArray
     """Standard deviations, for noise as coloured as the residuals are, (n,)."""
+    half_widths: FloatArray
+    """Half widths of the 95 % intervals around the values, (n,)."""
     standard: FloatArray
     """The same values as standard parameters, (n_standard,)."""
     train: float

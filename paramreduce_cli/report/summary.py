@@ -200,6 +200,7 @@ def _summarise_identification(identification: Identification | None) -> dict[str
             "folds": estimate.folds,
             "values": dict(zip(estimate.names, estimate.values, strict=True)),
             "deviations": dict(zip(estimate.names, estimate.deviations, strict=True)),
+            "half_widths": dict(zip(estimate.names, estimate.half_widths, strict=True)),
         }
         for estimate in (identification.full, identification.reduced)
     )

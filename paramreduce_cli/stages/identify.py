@@ -125,6 +125,7 @@ def _estimate_model(
         names=chosen.names,
         values=values,
         deviations=np.sqrt(np.maximum(0.0, np.diag(fitted.compute_covariance()))),
+        half_widths=fitted.compute_half_widths(),
         standard=columns @ values,
         train=own[0],
         held_out=other[0],

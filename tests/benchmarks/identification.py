@@ -8,7 +8,11 @@ import warnings
 
 import numpy as np
 
-from paramreduce_cli.identification.estimation import Rows, fit_weighted
+from paramreduce_cli.config.log_settings import LogSection
+from paramreduce_cli.identification.band_scoring import make_column_function
+from paramreduce_cli.identification.estimation import Rows, collect_rows, fit_weighted
+from paramreduce_cli.identification.measured_samples import LoggedSet
+from paramreduce_cli.identification.processing import process_logs
 from paramreduce_cli.identification.residual_hints import find_residual_hints
 from paramreduce_cli.identification.torque_hints import hint_at_gravity, hint_at_unit
 from paramreduce_cli.judgement.cross_validation import (
@@ -19,7 +23,7 @@ from paramreduce_cli.judgement.cross_validation import (
 from paramreduce_cli.multibody.noise import estimate_joint_noise
 from paramreduce_cli.multibody.observation import combine_factors
 from paramreduce_cli.multibody.orthogonal import solve_least_squares
-from paramreduce_cli.records import INERTIAL
+from paramreduce_cli.records import INERTIAL, RawLog, RawLogs
 from paramreduce_cli.reduction.criteria.torque import TorqueObjective
 from paramreduce_cli.reduction.fitting import fit
 from paramreduce_cli.reduction.problem import SelectionProblem
@@ -28,6 +32,8 @@ from tests.simulated_logs import RATE, along_axes, arm, coloured, simulated
 
 _NOISE = 0.03
 """Standard deviation of the noise, a share of each joint's torques."""
+_ENCODER = 2 * np.pi / 2**19
+"""Step of the recorded positions, rad."""
 _LEFT_OUT = {"coulomb": "fc", "viscous": "fv", "inertia": "Ia"}
 _SAID = {
     "unit": "in another unit",
@@ -64,15 +70,37 @@ def noisy(log, tau, pole, seed):
     return tau + coloured(tau.shape, _NOISE * np.std(log.tau, axis=0), pole, seed)
 
 
-def coverage(pole, count):
-    """Share of the true values within 1.96 standard deviations, and its extremes over parameters."""
+def fit_exact_states(log, tau):
+    """Fit to all 20 s with the states of the simulation."""
+    return fitted(log, tau, log.X)
+
+
+def fit_recorded_positions(log, tau):
+    """Fit to the first 12 s, states and cut-offs by the tool from positions of an encoder."""
+    _, dynamics, base, _ = arm()
+    columns = {f"q{j}": np.round(z / _ENCODER) * _ENCODER for j, z in enumerate(log.z.T, 1)}
+    columns |= {"t": log.time} | {f"tau{j}": values for j, values in enumerate(tau.T, 1)}
+    found = process_logs(
+        RawLogs((RawLog("log.csv", columns, 2),), ()), LogSection(files="log.csv"), log.names,
+        compute_columns=make_column_function(dynamics, np.array(base.columns)),
+    )  # fmt: skip
+    rows = LoggedSet(found.training, found, dynamics, "log.csv")
+    expansion = np.eye(dynamics.mechanism.n_parameters)[:, base.columns]
+    rows = collect_rows(rows.iterate_blocks(), expansion, rows.n_samples)
+    X, tau = np.concatenate(rows.X), np.concatenate(rows.tau)
+    scale = np.sqrt(np.mean(tau**2, axis=0))
+    return fit_weighted(rows, estimate_joint_noise(factorise(X, tau, 1), scale, rows.n_samples))
+
+
+def coverage(fit_log, pole, count):
+    """Share of the true values within 95 % intervals; its extremes over parameters, and over logs."""
     hits = []
     for seed in range(count):
         log = simulated(seed)
-        found = fitted(log, noisy(log, log.tau, pole, seed), log.X)
-        deviations = np.sqrt(np.diag(found.compute_covariance()))
-        hits.append(np.abs(found.parameters - log.values) < 1.96 * deviations)
-    return np.mean(hits), np.mean(hits, axis=0).min(), np.mean(hits, axis=0).max()
+        found = fit_log(log, noisy(log, log.tau, pole, seed))
+        hits.append(np.abs(found.parameters - log.values) < found.compute_half_widths())
+    by_parameter, by_log = np.mean(hits, axis=0), np.mean(hits, axis=1)
+    return np.mean(hits), *(edge(part) for part in (by_parameter, by_log) for edge in (min, max))
 
 
 def changed(case, log, seed):
@@ -193,10 +221,12 @@ def print_sizes(count):
 def main(logs=200, cases=100, sizes=22):
     warnings.simplefilter("ignore")
     print(f"{logs} simulated logs, {100 * _NOISE:g} % noise: true values within 95 % intervals")
-    for pole in (0.0, 0.9, 0.97):
-        mean, least, most = coverage(pole, logs)
-        print(f"  noise with a pole at {pole:<4}: {100 * mean:.1f} % ({100 * least:.0f} ... {100 * most:.0f} % "
-              "by parameter)", flush=True)  # fmt: skip
+    states = {"exact states, 20 s": fit_exact_states, "positions of 19 bits, 12 s": fit_recorded_positions}  # fmt: skip
+    for name, fit_log in states.items():
+        for pole in (0.0, 0.9, 0.97):
+            mean, least, most, worst, best = (100 * part for part in coverage(fit_log, pole, logs))
+            print(f"  {name}, noise with a pole at {pole:<4}: {mean:.1f} % ({least:.0f} ... {most:.0f} % by parameter, "
+                  f"{worst:.0f} ... {best:.0f} % by log)", flush=True)  # fmt: skip
     print(f"{cases} logs each: right hint first; for clean logs none at all")
     for case in ("clean", *_SAID):
         for pole in (0.0, 0.9):

@@ -4,12 +4,24 @@ import numpy as np
 import pytest
 from simulated_logs import RATE, coloured, simulated
 
-from paramreduce_cli.identification.estimation import LinearFit, Rows, fit_robustly, fit_weighted
+from paramreduce_cli.identification.estimation import (
+    LinearFit,
+    Rows,
+    collect_rows,
+    fit_robustly,
+    fit_weighted,
+)
 from paramreduce_cli.identification.residual_hints import (
     find_residual_hints,
     hint_at_negative_friction,
 )
-from paramreduce_cli.identification.uncertainty import ColouredNoise, compute_score_covariance
+from paramreduce_cli.identification.uncertainty import (
+    ColouredNoise,
+    compute_absorbed_noise,
+    compute_score_covariance,
+    count_degrees_of_freedom,
+)
+from paramreduce_cli.records import Block
 
 
 def rows_of(log, tau, X=None):
@@ -44,16 +56,65 @@ def test_the_covariance_of_scores_by_brute_force():
     assert np.allclose(compute_score_covariance([X], noise, weights), expected, rtol=1e-9)
 
 
+def test_the_noise_that_a_fit_absorbs_by_brute_force():
+    """Autocovariances of e minus those of (I - H) e, with H and the covariance of e written out."""
+    rng = np.random.default_rng(1)
+    n, pole, weights = 40, 0.8, np.array([2.0, 0.5])
+    X = rng.normal(size=(n, 2, 3))
+    noise = [ColouredNoise(np.array([pole]), 1.5), ColouredNoise(np.zeros(0), 0.3)]
+    lags = np.abs(np.subtract.outer(np.arange(n), np.arange(n)))
+    V = np.zeros((2 * n, 2 * n))
+    V[:n, :n], V[n:, n:] = 1.5 / (1 - pole**2) * pole**lags, 0.3 * np.eye(n)
+    A, W = np.concatenate([X[:, 0], X[:, 1]]), np.diag(np.repeat(weights, n))
+    inverse = np.linalg.inv(A.T @ W @ A)
+    gain = inverse @ A.T @ W
+    covariance = gain @ V @ gain.T
+    left = np.eye(2 * n) - A @ gain
+    lost = V - left @ V @ left.T
+    expected = [
+        [np.trace(lost[j * n : (j + 1) * n, j * n : (j + 1) * n], k) / n for k in range(5)]
+        for j in range(2)
+    ]
+    found = compute_absorbed_noise([X], noise, weights, inverse, covariance)
+    assert np.allclose(found[:, :5], expected, atol=1e-9)
+
+
+def test_degrees_of_freedom_follow_from_how_broad_a_signal_is():
+    """The noise at one harmonic has two, and one more as its time is short; the noise below white noise has many."""
+    n = 512
+    noise, one = [ColouredNoise(np.zeros(0), 2.0)], np.ones(1)
+    harmonic = np.cos(2 * np.pi * 8 * np.arange(n) / n)[:, None, None]
+    broad = np.random.default_rng(2).normal(size=(n, 1, 1))
+    slow = count_degrees_of_freedom([harmonic], noise, one, np.eye(1) / np.sum(harmonic**2))
+    fast = count_degrees_of_freedom([broad], noise, one, np.eye(1) / np.sum(broad**2))
+    assert 2 <= slow <= 3.01
+    assert 0.3 * n < fast < n
+
+
+def test_folds_of_one_motion_are_joined():
+    log = simulated(7)
+    n = log.time.size
+    borders = [slice(0, 500), slice(500, 1200), slice(1300, n)]
+    blocks = [
+        Block(k, *(part[rows] for part in (log.time, log.z, log.dz, log.ddz)),
+              *(part[rows] for part in (log.z, log.dz, log.ddz)),
+              log.tau[rows], log.X[rows].reshape(-1, log.X.shape[2]))
+        for k, rows in enumerate(borders)
+    ]  # fmt: skip
+    rows = collect_rows(blocks, np.eye(log.X.shape[2]), n - 100)
+    assert [len(part) for part in rows.tau] == [1200, n - 1300]
+    assert rows.step == pytest.approx(1 / RATE)
+
+
 @pytest.mark.parametrize("pole", [0.0, 0.9])
 def test_intervals_hold_the_truth(pole):
-    """Of few logs; `make benchmark` does it with two hundred."""
+    """Of few logs; `make identification` does it with two hundred."""
     hits = []
     for seed in range(8):
         log = simulated(seed)
         tau = log.tau + coloured(log.tau.shape, 0.05 * np.std(log.tau, axis=0), pole, seed)
         found = fitted(log, tau)
-        deviations = np.sqrt(np.diag(found.compute_covariance()))
-        hits.append(np.abs(found.parameters - log.values) < 1.96 * deviations)
+        hits.append(np.abs(found.parameters - log.values) < found.compute_half_widths())
     assert 0.90 < np.mean(hits) < 0.985
 
 

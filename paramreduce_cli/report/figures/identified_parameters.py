@@ -7,9 +7,6 @@ from paramreduce_cli.report.data import ReportData
 from paramreduce_cli.report.page_sections import PageSection, placed
 from paramreduce_cli.report.style import make_figure
 
-_CONFIDENCE = 1.96
-"""Standard deviations of an interval that holds the truth in 95 of 100 cases."""
-
 
 @placed(PageSection.IDENTIFICATION, 4)
 def identified_parameters(data: ReportData) -> Figure | None:
@@ -19,7 +16,7 @@ def identified_parameters(data: ReportData) -> Figure | None:
     if data.identification is None:
         return None
     found = data.identification.reduced
-    relative = _CONFIDENCE * found.deviations / np.maximum(np.abs(found.values), 1e-300)
+    relative = found.half_widths / np.maximum(np.abs(found.values), 1e-300)
     order = np.argsort(relative)
     drawn = make_figure(0.8)
     axes = drawn.subplots()

@@ -11,18 +11,20 @@ from paramreduce_cli.texts.table import Table
 
 @placed(PageSection.IDENTIFICATION, 5, tall=True)
 def identified_parameters(data: ReportData) -> Table:
-    """Values, standard deviations and relative standard deviations: of the reduced model, then of all base parameters."""
+    """Values, standard deviations, and half widths of the 95 % intervals relative to the values: of the reduced model,
+    then of all base parameters.
+    """
     found = data.identification
     rows: list[tuple[str, ...]] = []
     if found is not None:
         rows = [*_list_rows("reduced", found.reduced), *_list_rows("all", found.full)]
-    header = ("model", "parameter", "value", "std. dev.", "relative, %")
+    header = ("model", "parameter", "value", "std. dev.", "95 % interval, ± %")
     return Table("Identified parameters", header, tuple(rows))
 
 
 def _list_rows(model: str, estimate: Estimate) -> list[tuple[str, ...]]:
     """Return a row for every parameter of an estimate."""
-    relative = 100 * estimate.deviations / np.maximum(np.abs(estimate.values), 1e-300)
+    relative = 100 * estimate.half_widths / np.maximum(np.abs(estimate.values), 1e-300)
     cells = zip(estimate.names, estimate.values, estimate.deviations, relative, strict=True)
     return [
         (model, name, *format_measured(value, deviation), f"{percent:.2g}")
