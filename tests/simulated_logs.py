@@ -104,10 +104,10 @@ reduction:
 """
 
 
-def two_link_log(seconds=12.0, rate=200.0, noise=0.05, seed=0):
+def two_link_log(seconds=12.0, rate=200.0, noise=0.05, seed=0, settings=()):
     """Columns of a log of the two-link arm with friction, by name."""
-    mechanism = load_config(TWO_LINK).build_mechanism()
-    values = load_config(TWO_LINK).get_values()
+    config = load_config(TWO_LINK, list(settings))
+    mechanism, values = config.build_mechanism(), config.get_values()
     rng = np.random.default_rng(seed)
     time = np.arange(0, seconds, 1 / rate)
     series = np.array([[0.0, 1.0, 0.6, -1.1, 0.4, 0.7, 0.9], [0.2, -0.8, 0.9, 1.2, -0.5, 0.9, 0.7]])

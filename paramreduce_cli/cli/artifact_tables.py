@@ -104,15 +104,18 @@ def _tabulate_validation_errors(record: Validation, width: int) -> Table:
 
 @tabulate_artifact.register
 def _tabulate_identified_parameters(record: Identification, width: int) -> Table:
-    """Return a table of the identified parameters: value and standard deviation."""
-    found = record.reduced
+    """Return a table of the identified parameters of the payload alone, if there is one, or else of the reduced model:
+    value and standard deviation.
+    """
+    found = record.payload or record.reduced
     rows = [
         (name, *format_measured(value, deviation))
         for name, value, deviation in zip(
             found.names, found.values.tolist(), found.deviations.tolist(), strict=True
         )
     ]
-    title = f"Identified parameters of the reduced model; {format_percent(found.held_out)} of the held-out torques unexplained"
+    model = "reduced model" if record.payload is None else "payload alone"
+    title = f"Identified parameters of the {model}; {format_percent(found.held_out)} of the held-out torques unexplained"
     return Table(title, ("parameter", "value", "standard deviation"), tuple(rows))
 
 

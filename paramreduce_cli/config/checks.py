@@ -70,6 +70,10 @@ def _check_payloads_and_drives(config: Config) -> Iterator[Problem]:
     bodies = config.description.bodies
     for key, message in payloads.find_payload_problems(config.payloads, bodies.list_body_names()):
         yield ("payloads", *key), message
+    for k, name in enumerate(config.identification.payloads):
+        if name not in config.payloads:
+            error = UnknownNameError("payload", name, list(config.payloads))
+            yield ("identification", "payloads", k), error
     for key, message in drives.find_drive_problems(config.drives, bodies.list_coordinates()):
         yield ("drives", *key), message
     for name, drive in config.drives.items():

@@ -62,12 +62,15 @@ class Rows:
         return sum(part.shape[0] for part in self.tau)
 
 
-def collect_rows(blocks: Iterable[Block], columns: FloatArray, n_samples: int) -> Rows:
+def collect_rows(
+    blocks: Iterable[Block], columns: FloatArray, known_values: FloatArray, n_samples: int
+) -> Rows:
     """Return the rows of a model, evenly spread over all trajectories if there are too many.
 
     Args:
         blocks: The samples.
         columns: Matrix that expresses the model's columns by those of the standard parameters, (n_standard, p).
+        known_values: Standard parameters whose torques are subtracted, (n_standard,).
         n_samples: Number of samples.
     """
     fraction = min(1.0, _MOST_SAMPLES / n_samples)
@@ -86,7 +89,8 @@ def collect_rows(blocks: Iterable[Block], columns: FloatArray, n_samples: int) -
             parts.append([])
         previous = block.time[-1]
         X = (block.W @ columns).reshape(*block.tau.shape, -1)
-        parts[-1].append((X, block.tau, block.dz, block.ddz))
+        tau = block.tau - (block.W @ known_values).reshape(block.tau.shape)
+        parts[-1].append((X, tau, block.dz, block.ddz))
     joined = [tuple(map(np.concatenate, zip(*part, strict=True))) for part in parts]
     X, tau, dz, ddz = zip(*joined, strict=True)
     return Rows(X, tau, dz, ddz, step, sum(t.shape[0] for t in tau) / n_samples)

@@ -279,6 +279,8 @@ class Identification:
     """All base parameters."""
     reduced: Estimate
     """Estimate of the selected model."""
+    payload: Estimate | None
+    """Estimate of payloads alone, with the other bodies' values given; None if the config names no payloads."""
     residuals: Residuals
     consistency: Consistency | None
     hints: tuple[str, ...]

@@ -191,7 +191,7 @@ def _summarise_identification(identification: Identification | None) -> dict[str
     if identification is None:
         return None
     consistency = identification.consistency
-    full, reduced = (
+    full, reduced, payload = (
         {
             "n": len(estimate.names),
             "train": estimate.train,
@@ -202,7 +202,9 @@ def _summarise_identification(identification: Identification | None) -> dict[str
             "deviations": dict(zip(estimate.names, estimate.deviations, strict=True)),
             "half_widths": dict(zip(estimate.names, estimate.half_widths, strict=True)),
         }
-        for estimate in (identification.full, identification.reduced)
+        if estimate is not None
+        else None
+        for estimate in (identification.full, identification.reduced, identification.payload)
     )
     physical = consistency and {
         "train": consistency.train,
@@ -213,6 +215,7 @@ def _summarise_identification(identification: Identification | None) -> dict[str
         "estimator": identification.estimator,
         "full": full,
         "reduced": reduced,
+        "payload": payload,
         "consistent": physical,
         "comparison": identification.comparison,
         "hints": list(identification.hints),

@@ -10,6 +10,10 @@ from paramreduce_cli.identification import consistency as physics
 from paramreduce_cli.identification.estimation import LinearFit, collect_rows, fit_robustly
 from paramreduce_cli.identification.hints import find_hints
 from paramreduce_cli.identification.model_comparison import compare_held_out
+from paramreduce_cli.identification.payload_estimation import (
+    find_payload_hints,
+    list_payload_columns,
+)
 from paramreduce_cli.multibody.noise import estimate_joint_noise
 from paramreduce_cli.multibody.observation import combine_factors
 from paramreduce_cli.multibody.orthogonal import solve_least_squares
@@ -58,13 +62,22 @@ def identify(
     deviation = np.where(np.isfinite(scale), 1.0, np.inf)
     if identification.estimator != "ordinary":
         deviation = estimate_joint_noise(factors, scale, n_samples)
-    full, full_fit = _estimate_model(identification, make_base_model(model), samples, deviation)
+    base, chosen = make_base_model(model), validation.selected.model
+    known = np.zeros(model.values.size)
+    full, full_fit = _estimate_parameters(
+        identification, base.names, _make_expansion(base), known, samples, deviation
+    )
     report_progress(Progress("identification", 1, _STEPS, "base parameters"))
-    reduced, _ = _estimate_model(identification, validation.selected.model, samples, deviation)
+    reduced, _ = _estimate_parameters(
+        identification, chosen.names, _make_expansion(chosen), known, samples, deviation
+    )
+    payload = _estimate_payload(identification, model, samples, deviation)
     report_progress(Progress("identification", 2, _STEPS, "selected parameters"))
     consistency = _fit_consistent(identification, model, samples, deviation)
     delay = 0.0 if log is None else log.delay
     hints = find_hints(model, training, full, full_fit, consistency, delay)
+    if payload is not None:
+        hints += find_payload_hints(model.mechanism, identification.payloads, payload, full)
     for text in hints:
         warnings.warn(text.rstrip("."), ParamreduceWarning, stacklevel=2)
     shown = _take_first_samples(held_out)
@@ -75,6 +88,7 @@ def identify(
         torque_size=_compute_torque_rms(held_out),
         full=full,
         reduced=reduced,
+        payload=payload,
         residuals=full_fit.analyse_residuals(n_samples),
         consistency=consistency,
         hints=tuple(hints),
@@ -93,47 +107,82 @@ def _make_expansion(chosen: ReducedModel) -> FloatArray:
     return columns
 
 
-def _merge_factors(factors: FloatArray, columns: FloatArray) -> FloatArray:
-    """Return the factors of [W | tau] by trajectory and joint for the columns of a model."""
-    return np.concatenate([factors[..., :-1] @ columns, factors[..., -1:]], axis=-1)
+def _merge_factors(
+    factors: FloatArray, columns: FloatArray, known_values: FloatArray
+) -> FloatArray:
+    """Return the factors of [W columns | tau - W known] by trajectory and joint."""
+    W = factors[..., :-1]
+    rest = factors[..., -1] - W @ known_values
+    return np.concatenate([W @ columns, rest[..., None]], axis=-1)
 
 
-def _estimate_model(
-    section: IdentificationSection, chosen: ReducedModel, samples: Samples, deviation: FloatArray
+def _estimate_parameters(
+    section: IdentificationSection,
+    names: tuple[str, ...],
+    columns: FloatArray,
+    known_values: FloatArray,
+    samples: Samples,
+    deviation: FloatArray,
 ) -> tuple[Estimate, LinearFit]:
-    """Return the identified parameters of a model, and their fit."""
+    """Return the identified parameters of a model, and their fit.
+
+    Args:
+        section: Settings.
+        names: Names of the parameters.
+        columns: Matrix that expresses the model's columns by those of the standard parameters, (n_standard, n).
+        known_values: Standard parameters whose torques are subtracted, zero for those to be identified, (n_standard,).
+        samples: Samples.
+        deviation: Divisor of the torques of each joint, (n_dof,).
+    """
     training, held_out = samples.estimation, samples.validation
     assert held_out is not None
-    columns = _make_expansion(chosen)
-    factors = _merge_factors(training.compute_factors(), columns)
+    whole = training.compute_factors()
+    factors = _merge_factors(whole, columns, known_values)
     values = solve_least_squares(combine_factors(factors, deviation))
     if section.estimator == "robust":
         values, deviation = fit_robustly(
             lambda: (
-                ((b.W @ columns).reshape(*b.tau.shape, -1), b.tau)
+                (
+                    (b.W @ columns).reshape(*b.tau.shape, -1),
+                    b.tau - (b.W @ known_values).reshape(b.tau.shape),
+                )
                 for b in training.iterate_blocks()
             ),
             values,
             deviation,
         )
-    rows = collect_rows(training.iterate_blocks(), columns, training.n_samples)
+    rows = collect_rows(training.iterate_blocks(), columns, known_values, training.n_samples)
     fitted = LinearFit(rows, values, deviation)
-    own, other = (
-        _compute_errors(part, columns @ values, deviation) for part in (training, held_out)
-    )
+    standard = known_values + columns @ values
+    own, other = (_compute_errors(part, standard, deviation) for part in (training, held_out))
     estimate = Estimate(
-        names=chosen.names,
+        names=names,
         values=values,
         deviations=np.sqrt(np.maximum(0.0, np.diag(fitted.compute_covariance()))),
         half_widths=fitted.compute_half_widths(),
-        standard=columns @ values,
+        standard=standard,
         train=own[0],
         held_out=other[0],
         joint_train=own[1],
         joint_held_out=other[1],
-        folds=_cross_validate(factors, deviation),
+        folds=_cross_validate(factors, np.linalg.norm(whole[..., -1], axis=2), deviation),
     )
     return estimate, fitted
+
+
+def _estimate_payload(
+    section: IdentificationSection, model: Model, samples: Samples, deviation: FloatArray
+) -> Estimate | None:
+    """Return the identified parameters of payloads alone, or None if the config names none."""
+    if not section.payloads:
+        return None
+    factor = combine_factors(samples.estimation.compute_factors(), deviation)
+    indices = list_payload_columns(model.mechanism, model.values, section.payloads, factor)
+    fitted = [p.owner in section.payloads for p in model.mechanism.parameters]
+    columns = np.eye(model.values.size)[:, indices]
+    known = np.where(fitted, 0.0, model.values)
+    names = tuple(model.mechanism.parameters[k].name for k in indices)
+    return _estimate_parameters(section, names, columns, known, samples, deviation)[0]
 
 
 def _compute_errors(
@@ -152,15 +201,21 @@ def _compute_errors(
     return float(np.sqrt(left[measured].sum() / whole[measured].sum())), joints
 
 
-def _cross_validate(factors: FloatArray, deviation: FloatArray) -> FloatArray:
-    """Return the error on each fold of a fit without that fold; nothing if there is only one."""
+def _cross_validate(factors: FloatArray, norms: FloatArray, deviation: FloatArray) -> FloatArray:
+    """Return the error on each fold of a fit without that fold; nothing if there is only one.
+
+    Args:
+        factors: Triangular factors by fold and joint, (n_folds, n_dof, n + 1, n + 1).
+        norms: Norms of the torques, (n_folds, n_dof).
+        deviation: Divisor of the torques of each joint, (n_dof,).
+    """
     measured = np.isfinite(deviation)
     found = []
     for k in range(len(factors) if len(factors) > 1 else 0):
         values = solve_least_squares(combine_factors(np.delete(factors, k, axis=0), deviation))
         own = factors[k, measured]
         left = own[..., -1] - own[..., :-1] @ values
-        found.append(np.linalg.norm(left) / (np.linalg.norm(own[..., -1]) or 1.0))
+        found.append(np.linalg.norm(left) / (np.linalg.norm(norms[k, measured]) or 1.0))
     return np.array(found)
 
 

@@ -101,7 +101,8 @@ def test_folds_of_one_motion_are_joined():
               log.tau[rows], log.X[rows].reshape(-1, log.X.shape[2]))
         for k, rows in enumerate(borders)
     ]  # fmt: skip
-    rows = collect_rows(blocks, np.eye(log.X.shape[2]), n - 100)
+    p = log.X.shape[2]
+    rows = collect_rows(blocks, np.eye(p), np.zeros(p), n - 100)
     assert [len(part) for part in rows.tau] == [1200, n - 1300]
     assert rows.step == pytest.approx(1 / RATE)
 

@@ -12,6 +12,8 @@ from simulated_logs import FRICTION, log_config, two_link_log, write_log
 from paramreduce_cli.artifacts.store import Store, load_file
 from paramreduce_cli.config import load_config
 from paramreduce_cli.records import Identification, Samples, Validation
+from paramreduce_cli.running.pipeline import list_stages_to_run
+from paramreduce_cli.running.runner import Runner
 
 _LINK = '<link name="{}"><inertial><mass value="1"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial></link>'
 _JOINT = '<joint name="{}" type="continuous"><parent link="{}"/><child link="{}"/><axis xyz="0 1 0"/></joint>'
@@ -315,3 +317,52 @@ def test_a_log_of_other_kinematics_is_suspected(tmp_path, invoke):
     settings = ["report.formats=[svg]"]
     error = invoke("run", path, "--results", tmp_path / "r", settings=settings).err
     assert "are the kinematics in the config right" in " ".join(error.split())
+
+
+@pytest.fixture
+def identify_payload(tmp_path):
+    """Return the identification of a log with a tool of 0.7 kg, whose parameters the config does not know."""
+
+    def identify(settings=()):
+        tool = "payloads.tool={body: fore, m: 0.7, com: [0.3, 0.05, 0], inertia_com: [0, 0, 0, 0, 0, 0.01]}"
+        write_log(tmp_path / "log.csv", two_link_log(settings=[tool]))
+        extra = "payloads: {tool: {body: fore}}\nidentification: {payloads: [tool], consistency: none}\n"
+        config = load_config(
+            log_config(tmp_path, extra), [*settings, "reduction.heuristics=[essential]"]
+        )
+        store = Store(tmp_path / "results")
+        for stage in list_stages_to_run(config):
+            Runner(config, store).run(stage)
+            if stage.name == "identify":
+                break
+        return load_file(store.get_path(Identification), Identification, "two_link", "identify")[0]
+
+    return identify
+
+
+def test_a_payload_alone_is_identified(identify_payload):
+    """Against the truth. In a plane, mass, centre of mass and one inertia can be told."""
+    found = identify_payload()
+    payload = found.payload
+    inertia = 0.01 + 0.7 * (0.3**2 + 0.05**2)
+    truth = {"m_tool": 0.7, "mx_tool": 0.7 * 0.3, "my_tool": 0.7 * 0.05, "Izz_tool": inertia}
+    values = dict(zip(payload.names, payload.values, strict=True))
+    widths = dict(zip(payload.names, payload.half_widths, strict=True))
+    assert {name for name in values if name.endswith("_tool")} == set(truth)
+    for name, value in truth.items():
+        assert abs(values[name] - value) < 2 * widths[name] + 1e-3
+        assert widths[name] < 0.1
+    assert payload.held_out < 1.1 * found.full.held_out
+    assert found.hints == ()
+
+
+def test_wrong_values_of_the_arm_are_hinted_at(identify_payload):
+    found = identify_payload(["parameter_sets.slender_rods.upper.m=4"])
+    assert any("values of the other bodies do not fit" in text for text in found.hints)
+
+
+def test_an_unknown_payload_is_said(tmp_path, invoke):
+    path = log_config(tmp_path, "identification: {payloads: [tool]}\n")
+    error = invoke("run", path, "--results", tmp_path / "r", code=2).err
+    assert "identification.payloads" in error
+    assert "tool" in error

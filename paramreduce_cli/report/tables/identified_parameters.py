@@ -11,13 +11,14 @@ from paramreduce_cli.texts.table import Table
 
 @placed(PageSection.IDENTIFICATION, 5, tall=True)
 def identified_parameters(data: ReportData) -> Table:
-    """Values, standard deviations, and half widths of the 95 % intervals relative to the values: of the reduced model,
-    then of all base parameters.
+    """Values, standard deviations, and half widths of the 95 % intervals relative to the values: of payloads
+    identified alone, of the reduced model, then of all base parameters.
     """
     found = data.identification
     rows: list[tuple[str, ...]] = []
     if found is not None:
-        rows = [*_list_rows("reduced", found.reduced), *_list_rows("all", found.full)]
+        alone = [] if found.payload is None else _list_rows("payload", found.payload)
+        rows = [*alone, *_list_rows("reduced", found.reduced), *_list_rows("all", found.full)]
     header = ("model", "parameter", "value", "std. dev.", "95 % interval, ± %")
     return Table("Identified parameters", header, tuple(rows))
 
