@@ -20,7 +20,13 @@ from paramreduce_cli.identification.band_scoring import (
     make_column_function,
 )
 from paramreduce_cli.identification.data_split import Piece
-from paramreduce_cli.identification.state_estimation import compute_edge
+from paramreduce_cli.identification.state_estimation import (
+    PER_STATE_CUTOFF,
+    Cutoffs,
+    choose_decimation,
+    compute_edge,
+    estimate_states,
+)
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.multibody.noise import estimate_joint_noise
 from paramreduce_cli.records import (
@@ -130,7 +136,7 @@ def select_friction(
         The choice, or None if the log is too short for one.
     """
     edges = np.array([compute_edge(piece, rate, cutoffs.state) for piece in pieces])
-    fastest = _find_largest_speeds(pieces, rate, model)
+    fastest = _find_largest_speeds(pieces, rate, cutoffs.state, model)
     candidates = [
         _list_candidates(drive, speed) for drive, speed in zip(model.drives, fastest, strict=True)
     ]
@@ -166,11 +172,21 @@ def _list_candidates(drive: Drive, fastest: float) -> list[_Candidate]:
     return [*signs, _Candidate(Kind.ASYMMETRY), _Candidate(Kind.QUADRATIC)]
 
 
-def _find_largest_speeds(pieces: Sequence[Piece], rate: float, model: FrictionModel) -> FloatArray:
-    """Return the speed that each drive exceeds in one of a hundred samples, rad/s or m/s, (n_drives,)."""
-    speeds = np.concatenate(
-        [np.gradient(np.asarray(piece.signals.z), 1 / rate, axis=0) for piece in pieces]
-    )
+def _find_largest_speeds(
+    pieces: Sequence[Piece], rate: float, state: float, model: FrictionModel
+) -> FloatArray:
+    """Return the speed that each drive exceeds in one of a hundred samples, rad/s or m/s, (n_drives,).
+
+    Args:
+        pieces: Training pieces as recorded.
+        rate: Recorded samples per second.
+        state: State cut-off, Hz.
+        model: The drives.
+    """
+    cutoffs = Cutoffs(state, np.inf)
+    decimation = choose_decimation(cutoffs, rate, min(rate, PER_STATE_CUTOFF * state))
+    smooth = [estimate_states(piece, rate, cutoffs, decimation).signals for piece in pieces]
+    speeds = np.concatenate([np.asarray(signals.dz) for signals in smooth])
     weights = np.array([drive.weights[list(model.independent)] for drive in model.drives])
     result: FloatArray = np.quantile(np.abs(speeds @ weights.T), 0.99, axis=0)
     return np.maximum(result, 1e-9)

@@ -42,6 +42,7 @@ from paramreduce_cli.identification.state_estimation import (
     choose_decimation,
     estimate_states,
 )
+from paramreduce_cli.identification.state_noise import estimate_position_noise
 from paramreduce_cli.records import (
     BoolArray,
     CutoffSearch,
@@ -168,6 +169,7 @@ def process_logs(
         delay=section.delay,
         noise=noise,
         noise_share=float(np.sqrt(np.sum(noise**2) / power)),
+        position_noise=estimate_position_noise(longest, rate, spectra),
         shown=collect_signals(
             before,
             place.get_pieces(made, made_tested),

@@ -179,6 +179,8 @@ class MeasuredLog:
     contains where there is none, (n_dof,): no model explains it."""
     noise_share: float
     """The same of all joints together, a share of the torques."""
+    position_noise: FloatArray
+    """Power spectral density of the noise of the positions, rad^2/Hz (m^2/Hz); zero where speeds were recorded, (n_dof,)."""
     shown: ShownSignals
     spectra: Spectra
     search: CutoffSearch | None

@@ -14,6 +14,8 @@ from paramreduce_cli.identification.payload_estimation import (
     find_payload_hints,
     list_payload_columns,
 )
+from paramreduce_cli.identification.state_noise import compute_noisy_factors, hint_at_state_noise
+from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.multibody.noise import estimate_joint_noise
 from paramreduce_cli.multibody.observation import combine_factors
 from paramreduce_cli.multibody.orthogonal import solve_least_squares
@@ -76,6 +78,9 @@ def identify(
     consistency = _fit_consistent(identification, model, samples, deviation)
     delay = 0.0 if log is None else log.delay
     hints = find_hints(model, training, full, full_fit, consistency, delay)
+    if log is not None:
+        shifts = _predict_shifts(log, model, _make_expansion(base), full.values, deviation)
+        hints += hint_at_state_noise(full.names, log.state_cutoff, shifts / full.deviations)
     if payload is not None:
         hints += find_payload_hints(model.mechanism, identification.payloads, payload, full)
     for text in hints:
@@ -168,6 +173,28 @@ def _estimate_parameters(
         folds=_cross_validate(factors, np.linalg.norm(whole[..., -1], axis=2), deviation),
     )
     return estimate, fitted
+
+
+def _predict_shifts(
+    log: MeasuredLog, model: Model, columns: FloatArray, values: FloatArray, deviation: FloatArray
+) -> FloatArray:
+    """Return the shifts of the base parameters by each of several additional noises in the states, (n_noises, n)."""
+    dynamics = Dynamics(model.mechanism, once=True)
+    known = np.zeros(model.values.size)
+    shifts = [
+        np.mean(
+            [
+                solve_least_squares(
+                    combine_factors(_merge_factors(factors, columns, known), deviation)
+                )
+                for factors in pair
+            ],
+            axis=0,
+        )
+        - values
+        for pair in compute_noisy_factors(log, dynamics, np.isfinite(deviation))
+    ]
+    return np.reshape(shifts, (-1, values.size))
 
 
 def _estimate_payload(
