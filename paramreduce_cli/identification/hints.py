@@ -25,6 +25,7 @@ from paramreduce_cli.records import (
     Estimate,
     FloatArray,
     Kind,
+    MeasuredLog,
     Model,
     SampleSet,
 )
@@ -57,7 +58,7 @@ def find_hints(
     full: Estimate,
     fitted: LinearFit,
     consistency: Consistency | None,
-    delay: float,
+    log: MeasuredLog | None,
 ) -> list[str]:
     """Return hints at likely causes of large errors, the most important first.
 
@@ -67,8 +68,9 @@ def find_hints(
         full: Estimate of all base parameters.
         fitted: Fit of all base parameters, with its residuals.
         consistency: Physically consistent parameters; None if they were not computed.
-        delay: Delay of the torques that was already compensated, s.
+        log: Log that the samples are of; None for other samples.
     """
+    tuned = () if log is None or log.friction is None else log.friction.drives
     looked_at = _sample_states(model, training)
     gravity = hint_at_gravity(
         looked_at.W, looked_at.pulls, looked_at.tau, fitted.deviation, model.mechanism.gravity
@@ -96,11 +98,12 @@ def find_hints(
             names,
             _compute_tilt_torques(model, training, fitted),
             gravity=float(np.linalg.norm(mechanism.gravity)),
-            delay=delay,
+            delay=0.0 if log is None else log.delay,
             sliding=[mechanism.bodies[k].joint == "prismatic" for k in mechanism.independent],
             modelled=[
                 f"drives.{p.owner}.{p.kind.key}" for p in mechanism.parameters if p.kind in DRIVE
             ],
+            tuned=tuned,
         ),
         *_hint_at_friction(model, full),
         *_hint_at_impossible_bodies(full, consistency),

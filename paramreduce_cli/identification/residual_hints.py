@@ -62,6 +62,7 @@ def find_residual_hints(
     delay: float = 0.0,
     sliding: Sequence[bool] = (),
     modelled: Collection[str] = (),
+    tuned: Collection[str] = (),
 ) -> list[str]:
     """Return hints about likely causes of the residuals, the strongest first.
 
@@ -74,6 +75,7 @@ def find_residual_hints(
         delay: Delay that was already taken back, s.
         sliding: Whether coordinates are lengths; none if left out.
         modelled: Keys of drives that are in the model, such as ``drives.q1.coulomb``.
+        tuned: Names of the drives whose smoothing of friction the log has decided.
     """
     mistaken = list(_find_mistaken_columns(fitted, names))
     if mistaken:
@@ -81,7 +83,7 @@ def find_residual_hints(
     found: list[str] = []
     tried: set[int] = set()
     slides = list(sliding) or [False] * len(names)
-    candidates = list(_list_signals(fitted, names, tilts, gravity, delay, slides, modelled))
+    candidates = list(_list_signals(fitted, names, tilts, gravity, delay, slides, modelled, tuned))
     while len(found) < _MOST:
         judged = [
             (*_test_signal(fitted, candidate), k)
@@ -156,6 +158,7 @@ def _list_signals(
     delay: float,
     sliding: Sequence[bool],
     modelled: Collection[str],
+    tuned: Collection[str],
 ) -> Iterator[_Signal]:
     """Yield the signals that residuals may contain: those of each measured joint, then delay and tilt.
 
@@ -181,9 +184,10 @@ def _list_signals(
             _restrict_to_joint(signs, j),
             _missing(name, "the sign of its speed", force, "coulomb"),
         )
-        yield _Signal(
-            j, _restrict_to_joint(smooth, j), _make_smoothing_hint(name, _SMOOTH * fastest[j])
-        )
+        if name not in tuned:
+            yield _Signal(
+                j, _restrict_to_joint(smooth, j), _make_smoothing_hint(name, _SMOOTH * fastest[j])
+            )
         yield _Signal(
             j,
             _restrict_to_joint(rows.dz, j),

@@ -76,8 +76,7 @@ def identify(
     payload = _estimate_payload(identification, model, samples, deviation)
     report_progress(Progress("identification", 2, _STEPS, "selected parameters"))
     consistency = _fit_consistent(identification, model, samples, deviation)
-    delay = 0.0 if log is None else log.delay
-    hints = find_hints(model, training, full, full_fit, consistency, delay)
+    hints = find_hints(model, training, full, full_fit, consistency, log)
     if log is not None:
         shifts = _predict_shifts(log, model, _make_expansion(base), full.values, deviation)
         hints += hint_at_state_noise(full.names, log.state_cutoff, shifts / full.deviations)

@@ -245,3 +245,15 @@ def test_what_is_modelled_is_of_another_form_if_anything():
     found = find_residual_hints(fitted(log, log.tau, X), log.names, modelled=[f"drives.{n}.coulomb" for n in log.names])  # fmt: skip
     assert any("coulomb is of another form" in text for text in found)
     assert not any("missing" in text for text in found)
+
+
+def test_smoothing_that_the_log_has_decided_is_not_hinted_at():
+    """Friction with a smooth sign that the model lacks."""
+    log = simulated(9)
+    speed = log.dz[:, 0] / (0.05 * np.abs(log.dz[:, 0]).max())
+    tau = log.tau.copy()
+    tau[:, 0] += 0.2 * np.std(tau[:, 0]) * (np.tanh(speed) - np.sign(speed))
+    fit = fitted(log, tau + coloured(tau.shape, 0.01 * np.std(log.tau, axis=0), 0.0, 9))
+    assert any("smoothing" in text for text in find_residual_hints(fit, log.names))
+    tuned = find_residual_hints(fit, log.names, tuned=log.names[:1])
+    assert not any("smoothing" in text for text in tuned)
