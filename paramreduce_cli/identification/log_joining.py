@@ -1,4 +1,4 @@
-"""Parts of one recording in several files, such as positions and torques, joined by their times."""
+"""Parts of one recording in several files or topics, such as positions and torques, joined by their times."""
 
 from collections.abc import Sequence
 
@@ -51,6 +51,38 @@ def join_logs(parts: Sequence[RawLog], time: str) -> RawLog:
     others = {name: kind for part in parts for name, kind in part.others.items()}
     sources = " + ".join(part.source for part in parts)
     return RawLog(sources, columns, first_line=None, others=others)
+
+
+def align_column(log: RawLog, name: str, time: str) -> FloatArray | None:
+    """Return a column of another topic, interpolated at the times of a recording; None if its own times are not known.
+
+    The column of its times has the same last name, and lies beside it or above: ``/motors/time`` for
+    ``/motors/current/1``. Outside its own times the column is not a number.
+
+    Args:
+        log: Log with several topics or groups.
+        name: Name of the column.
+        time: Name of the column of times.
+    """
+    own = find_times(log, name, time)
+    if own is None or time not in log.columns:
+        return None
+    recorded_at, at = log.columns[own], log.columns[time]
+    if not np.all(np.diff(recorded_at) > 0):
+        return None
+    values = _interpolate(recorded_at, log.columns[name], at)
+    values[(at < recorded_at[0]) | (at > recorded_at[-1])] = np.nan
+    return values
+
+
+def find_times(log: RawLog, name: str, time: str) -> str | None:
+    """Return the name of the column with the times of a column; None if there is none of the same length."""
+    parts = name.split("/")
+    for k in range(len(parts) - 1, 0, -1):
+        candidate = "/".join([*parts[:k], time.rsplit("/", maxsplit=1)[-1]])
+        if candidate in log.columns and log.columns[candidate].size == log.columns[name].size:
+            return candidate
+    return None
 
 
 def _get_times(part: RawLog, time: str) -> FloatArray:

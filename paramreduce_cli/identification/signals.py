@@ -21,6 +21,7 @@ from paramreduce_cli.errors import ConfigError, DataError
 from paramreduce_cli.fields.section import expand_per_joint
 from paramreduce_cli.identification import filters
 from paramreduce_cli.identification.encoder_wraps import unwrap_positions
+from paramreduce_cli.identification.log_joining import align_column, find_times
 from paramreduce_cli.records import BoolArray, FloatArray, RawLog
 from paramreduce_cli.resources.scratch import allocate_matrix, stack_columns
 
@@ -204,7 +205,8 @@ def _read_matrix(
         joint: name for joint, name in zip(joints, listed, strict=True) if joint not in left_out
     }
     found = {
-        joint: _read_column(log, name, missing=key == "torque") for joint, name in known.items()
+        joint: _read_column(log, name, missing=key == "torque", rows=rows)
+        for joint, name in known.items()
     }
     if rows is None:
         first = next(iter(log.columns))
@@ -218,8 +220,18 @@ def _read_matrix(
     return stack_columns([found.get(joint, np.zeros(rows[1])) for joint in joints])
 
 
-def _read_column(log: RawLog, name: str, *, missing: bool = False) -> FloatArray:
+def _read_column(
+    log: RawLog, name: str, *, missing: bool = False, rows: tuple[str, int] | None = None
+) -> FloatArray:
     """Return a column of numbers; with ``missing`` some entries may be no numbers.
+
+    A column of another topic with times of its own is interpolated at the times of the recording.
+
+    Args:
+        log: Log as read.
+        name: Name of the column.
+        missing: Whether some entries may be no numbers.
+        rows: Name of the column of times and its number of rows; None without times.
 
     Raises:
         DataError: The column is missing, too short, or holds entries that are no finite numbers.
@@ -241,6 +253,8 @@ def _read_column(log: RawLog, name: str, *, missing: bool = False) -> FloatArray
         )
     if missing:
         wrong = np.flatnonzero(np.abs(column) >= _LARGEST)
+    if not wrong.size and rows is not None and column.size != rows[1]:
+        column = _align(log, name, column, rows[0], missing=missing)
     if wrong.size:
         more = f", nor are {wrong.size - 1} others" if wrong.size > 1 else ""
         raise DataError(
@@ -250,6 +264,23 @@ def _read_column(log: RawLog, name: str, *, missing: bool = False) -> FloatArray
     if column.size < _FEWEST:
         raise DataError(f"{log.source}: {column.size} rows are too few; use {_FEWEST} or more.")
     return column
+
+
+def _align(log: RawLog, name: str, column: FloatArray, time: str, *, missing: bool) -> FloatArray:
+    """Return a column of another topic at the times of the recording, or as it is if its own times are not known.
+
+    Raises:
+        DataError: The column was not recorded at all of these times, and none may be missing.
+    """
+    aligned = align_column(log, name, time)
+    if aligned is None:
+        return column
+    if not missing and not np.all(np.isfinite(aligned)):
+        raise DataError(
+            f"{log.source}: column {name} was not recorded at all times of {time}. Set sampling.log.columns.time to its own "
+            f"times, {find_times(log, name, time)}."
+        )
+    return aligned
 
 
 def _check_time(log: RawLog, name: str, time: FloatArray) -> None:

@@ -213,6 +213,35 @@ def test_signals_of_different_length_are_named():
     assert read_signals(unused, section(), NAMES).time.size == 400
 
 
+TOPICS = {"time": "/states/time", "position": "/states/q/{}", "torque": "/motors/effort/{}"}
+
+
+def topics(first=-0.1, last=2.1):
+    """Positions and torques of topics with rates of their own, as a bag has them."""
+    t, own = np.arange(400) / 200, np.arange(first, last, 1 / 130)
+    columns = {"/states/time": t, "/motors/time": own}
+    for j in (1, 2):
+        columns |= {f"/states/q/{j}": np.sin(j * t), f"/motors/effort/{j}": np.cos(3 * j * own)}
+    return columns
+
+
+def test_topics_with_times_of_their_own_are_joined():
+    found = read_signals(RawLog("x", topics(), None), section(columns=TOPICS), NAMES)
+    t = np.arange(400) / 200
+    assert np.allclose(found.tau, np.cos(3 * np.outer(t, [1, 2])), atol=1e-4)
+
+
+def test_torques_of_a_topic_that_begins_late_are_missing():
+    found = read_signals(RawLog("x", topics(first=0.3), None), section(columns=TOPICS), NAMES)
+    assert np.array_equal(np.isnan(found.tau[:, 0]), found.time < 0.3)
+
+
+def test_positions_of_a_topic_that_begins_late_are_said():
+    other = {**TOPICS, "time": "/motors/time"}
+    with pytest.raises(DataError, match="to its own times, /states/time"):
+        read_signals(RawLog("x", topics(), None), section(columns=other), NAMES)
+
+
 def test_text_and_objects_that_nobody_asks_for(tmp_path):
     rows = (tmp_path / "log.csv", tmp_path / "log.npz")
     lines = ["t,mode,q1", *(f"{k},AUTO,{k / 2}" for k in range(60)), ""]
