@@ -28,6 +28,7 @@ from paramreduce_cli.reduction.criteria.torque import TorqueObjective
 from paramreduce_cli.reduction.fitting import fit
 from paramreduce_cli.reduction.problem import SelectionProblem
 from paramreduce_cli.reduction.task import Effort, SelectionTask, run
+from tests.benchmarks.estimators import print_estimators
 from tests.simulated_logs import RATE, along_axes, arm, coloured, simulated
 
 _NOISE = 0.03
@@ -51,6 +52,8 @@ _EVERY = 10
 _LEARNED = 0.6
 """Share of a log that is learned from."""
 _FOLDS = 5
+_DRAWS = 25
+"""Logs of the comparison of estimators, as BIRDy has."""
 _FIRST_SEED = 12
 """Logs of smaller seeds were looked at when the rule for the size was chosen."""
 _SHARED = 3
@@ -261,6 +264,7 @@ def main(logs=200, cases=100, sizes=22):
         for pole in (0.0, 0.9):
             print(f"  {case:8} pole {pole}: {100 * right(case, pole, cases):.0f} %", flush=True)
     print_model_errors(sizes)
+    print_estimators(_DRAWS)
     print_sizes(sizes)
 
 
