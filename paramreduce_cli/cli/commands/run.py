@@ -196,10 +196,21 @@ def _say_summary(summary: dict[str, Any]) -> None:
         )
     if found is not None:
         say(found["comparison"])
+        if found["payload"] is not None:
+            say(_describe_payload(found["payload"]))
         if found["consistent"] is not None:
             say(
                 f"Physically consistent parameters: {format_percent(found['consistent']['held_out'])} held out"
             )
+
+
+def _describe_payload(payload: dict[str, Any]) -> str:
+    """Return a sentence on the payload that was identified alone: its values with 95 % intervals."""
+    values = ", ".join(
+        f"{name} = {value:.4g} ± {payload['half_widths'][name]:.2g}"
+        for name, value in payload["values"].items()
+    )
+    return f"Payload alone, with 95 % intervals: {values} (SI units). Its error is {format_percent(payload['held_out'])} held out."
 
 
 def _list_cells(row: dict[str, Any], *, tested: bool) -> list[str]:

@@ -12,6 +12,9 @@ def hints(data: ReportData) -> Table:
     rows: list[tuple[str, str]] = []
     if found is not None:
         rows = [("comparison", found.comparison), *(("hint", text) for text in found.hints)]
+        if found.payload is not None:
+            text = f"{100 * found.payload.held_out:.3g} % of the held-out torques are unexplained by the payload alone."
+            rows.append(("payload", text))
         if found.consistency is not None:
             verdict = "can exist" if found.consistency.positive else "do not all exist"
             text = f"{100 * found.consistency.held_out:.3g} % held out"
