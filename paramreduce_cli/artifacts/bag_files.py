@@ -60,7 +60,7 @@ def load_bag(path: Path) -> RawLog:
 def _name_columns(
     topic: str, fields: Mapping[str, tuple[array.array, array.array]], start: float
 ) -> dict[str, FloatArray]:
-    """Name the columns of a topic, and their times: TOPIC/time of most columns, of others TOPIC/time_of/FIELD.
+    """Name the columns of a topic, and their times: TOPIC/time of most columns, TOPIC/time_of/FIELD of each other one.
 
     Several nodes may publish some joints each under one topic, so each column has the times of the messages that
     contain it.
@@ -75,8 +75,8 @@ def _name_columns(
         groups.setdefault(times.tobytes(), []).append(name)
     columns: dict[str, FloatArray] = {}
     for k, names in enumerate(sorted(groups.values(), key=len, reverse=True)):
-        key = f"{topic}/time" if k == 0 else f"{topic}/time_of/{names[0]}"
-        columns[key] = np.frombuffer(fields[names[0]][0]) - start
+        keys = [f"{topic}/time"] if k == 0 else [f"{topic}/time_of/{name}" for name in names]
+        columns |= dict.fromkeys(keys, np.frombuffer(fields[names[0]][0]) - start)
         columns |= {f"{topic}/{name}": np.frombuffer(fields[name][1]) for name in names}
     return columns
 

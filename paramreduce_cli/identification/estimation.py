@@ -24,7 +24,7 @@ from paramreduce_cli.records import Block, FloatArray, Residuals
 _MOST_SAMPLES = 40_000
 """That noise and standard deviations are taken from."""
 _ROUNDS = 8
-"""Rounds of the correction for the noise that a fit takes out of its residuals."""
+"""Iterations of the correction for the noise that the fit has absorbed."""
 _SAME_STEP = 0.01
 """Relative error of a step between samples up to which a motion goes on, as folds of one piece do."""
 _TUNING = 1.345
@@ -181,13 +181,13 @@ class LinearFit:
     def noise(self) -> list[ColouredNoise]:
         """Coloured noise of each joint.
 
-        The fit absorbs slow noise. The noise is that whose expected residuals have the autocovariances of the residuals.
+        The fit absorbs slow noise. The model is chosen so that its expected residuals have the autocovariances of the residuals.
         """
         n_dof, n = self.deviation.size, self.rows.n_samples
         seen = [estimate_autocovariance([e[:, j] for e in self.residuals]) for j in range(n_dof)]
         models = [fit_noise(a, n) for a in seen]
         for _ in range(_ROUNDS):
-            lost = compute_absorbed_noise(
+            lost = self.rows.fraction * compute_absorbed_noise(
                 self.rows.X, models, self.weights, self._inverse, self._propagate_noise(models)
             )
             models = [fit_noise(add_lost_noise(a, b), n) for a, b in zip(seen, lost, strict=True)]

@@ -273,11 +273,12 @@ class _Search:
         """Return the squared error on each fold, relative to the torques of all folds, (n_folds,)."""
         T = self._combine_columns(choices, self._plain.shape[-1])
         weighted, plain = T.T @ self._weighted @ T, T.T @ self._plain @ T
-        whole = weighted.sum(axis=0)
+        least = _RIDGE * np.diag(weighted.sum(axis=0))[:-1] + 1e-300
         errors = []
-        for fold, tested in zip(weighted, plain, strict=True):
-            G = whole - fold
-            lengths = np.sqrt(np.maximum(np.diag(G)[:-1], 1e-300))
+        for k, tested in enumerate(plain):
+            G = np.delete(weighted, k, axis=0).sum(axis=0)
+            # A joint may move in one fold only; its columns are rounding elsewhere.
+            lengths = np.sqrt(np.maximum(np.diag(G)[:-1], least))
             A = G[:-1, :-1] / np.outer(lengths, lengths)
             A[np.diag_indices_from(A)] += _RIDGE
             values = scipy.linalg.solve(A, G[:-1, -1] / lengths, assume_a="pos") / lengths

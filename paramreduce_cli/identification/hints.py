@@ -68,7 +68,7 @@ def find_hints(
         full: Estimate of all base parameters.
         fitted: Fit of all base parameters, with its residuals.
         consistency: Physically consistent parameters; None if they were not computed.
-        log: Log that the samples are of; None for other samples.
+        log: Log from which the samples were made; None if they are not from a log.
     """
     tuned = () if log is None or log.friction is None else log.friction.drives
     looked_at = _sample_states(model, training)

@@ -11,6 +11,9 @@ from paramreduce_cli.records import FloatArray, RawLog
 _LEAST_COMMON = 0.5
 """Share of the shortest part's duration in which all parts have to be recorded."""
 
+_GAP = 5.5
+"""Usual time steps that make a gap."""
+
 
 def join_logs(parts: Sequence[RawLog], time: str) -> RawLog:
     """Return the columns of all parts at the times of the part with the most rows a second.
@@ -53,35 +56,42 @@ def join_logs(parts: Sequence[RawLog], time: str) -> RawLog:
     return RawLog(sources, columns, first_line=None, others=others)
 
 
-def align_column(log: RawLog, name: str, time: str) -> FloatArray | None:
-    """Return a column of another topic, interpolated at the times of a recording; None if its own times are not known.
+def align_column(log: RawLog, name: str, time: str) -> FloatArray:
+    """Return a column at the times of a recording: interpolated if it belongs to a topic with times of its own.
 
-    The column of its times has the same last name, and lies beside it or above: ``/motors/time`` for
-    ``/motors/current/1``. Outside its own times the column is not a number.
+    Outside its own times and in their gaps the column is not a number.
 
     Args:
         log: Log with several topics or groups.
         name: Name of the column.
         time: Name of the column of times.
     """
-    own = find_times(log, name, time)
-    if own is None or time not in log.columns:
-        return None
+    values, own = log.columns[name], find_times(log, name, time)
+    if own is None or own == time or np.array_equal(log.columns[own], log.columns[time]):
+        return values
     recorded_at, at = log.columns[own], log.columns[time]
-    if not np.all(np.diff(recorded_at) > 0):
-        return None
-    values = _interpolate(recorded_at, log.columns[name], at)
-    values[(at < recorded_at[0]) | (at > recorded_at[-1])] = np.nan
-    return values
+    steps = np.diff(recorded_at)
+    if not np.all(steps > 0):
+        return values
+    aligned = _interpolate(recorded_at, values, at)
+    following = np.clip(np.searchsorted(recorded_at, at), 1, steps.size)
+    outside = (at < recorded_at[0]) | (at > recorded_at[-1])
+    aligned[outside | (steps[following - 1] > _GAP * np.median(steps))] = np.nan
+    return aligned
 
 
 def find_times(log: RawLog, name: str, time: str) -> str | None:
-    """Return the name of the column with the times of a column; None if there is none of the same length."""
-    parts = name.split("/")
+    """Return the name of the column with the times of a column; None if there is none of the same length.
+
+    The times of ``/motors/current/1`` are ``/motors/time_of/current/1`` or ``/motors/time``, where ``time`` is the last part of
+    the name of the times of the recording.
+    """
+    parts, last = name.split("/"), time.rsplit("/", maxsplit=1)[-1]
     for k in range(len(parts) - 1, 0, -1):
-        candidate = "/".join([*parts[:k], time.rsplit("/", maxsplit=1)[-1]])
-        if candidate in log.columns and log.columns[candidate].size == log.columns[name].size:
-            return candidate
+        topic = "/".join(parts[:k])
+        for candidate in (f"{topic}/{last}_of/{'/'.join(parts[k:])}", f"{topic}/{last}"):
+            if candidate in log.columns and log.columns[candidate].size == log.columns[name].size:
+                return candidate
     return None
 
 

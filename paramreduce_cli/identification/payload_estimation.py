@@ -4,12 +4,15 @@ from collections.abc import Collection, Iterator
 
 import numpy as np
 
-from paramreduce_cli.multibody.base_parameters import choose_base
-from paramreduce_cli.records import DRIVE, INERTIAL, Estimate, FloatArray, IntArray, Mechanism
+from paramreduce_cli.multibody.orthogonal import select_independent
+from paramreduce_cli.records import DRIVE, INERTIAL, Estimate, FloatArray, IntArray, Kind, Mechanism
 from paramreduce_cli.robots.inertia import compute_pseudo_inertia, is_positive_semidefinite
 
-_INDEPENDENT = 1e-6
-"""Singular values of the payloads' columns below this share of the largest one count as zero."""
+_FIRST = (Kind.MX, Kind.MY, Kind.MZ)
+_INDEPENDENT = 1e-4
+"""Share of a column that those before it must leave for it to be fitted."""
+_ROUNDING = 1e-9
+"""Share of the longest column below which a column is round-off."""
 _MUCH_WORSE = 1.2
 """Ratio of the errors on held-out torques from which on the other bodies' values are doubted."""
 
@@ -19,7 +22,8 @@ def list_payload_columns(
 ) -> IntArray:
     """Return the parameters to be fitted: those of payloads, and those of drives whose value is zero.
 
-    Parameters that the torques cannot tell from the others are left out.
+    Parameters that the torques cannot tell from those before them are left out: first moments come first, then the mass,
+    then inertias.
 
     Args:
         mechanism: The robot.
@@ -33,9 +37,11 @@ def list_payload_columns(
         for k, p in enumerate(parameters)
         if (p.kind in INERTIAL and p.owner in payloads) or (p.kind in DRIVE and values[k] == 0)
     ]
-    order = np.arange(len(fitted))
-    chosen = choose_base(factor[:, fitted], order, _INDEPENDENT).columns
-    return np.array(fitted, dtype=np.int64)[np.sort(chosen)]
+    lengths = np.linalg.norm(factor[:, fitted], axis=0)
+    moving = np.flatnonzero(lengths > _ROUNDING * lengths.max(initial=0.0))
+    order = sorted(moving.tolist(), key=lambda k: parameters[fitted[k]].kind not in _FIRST)
+    chosen = select_independent(factor[:, fitted], np.array(order, dtype=np.int64), _INDEPENDENT)
+    return np.array(sorted(fitted[k] for k in chosen), dtype=np.int64)
 
 
 def find_payload_hints(

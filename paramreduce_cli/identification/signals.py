@@ -21,7 +21,7 @@ from paramreduce_cli.errors import ConfigError, DataError
 from paramreduce_cli.fields.section import expand_per_joint
 from paramreduce_cli.identification import filters
 from paramreduce_cli.identification.encoder_wraps import unwrap_positions
-from paramreduce_cli.identification.log_joining import align_column, find_times
+from paramreduce_cli.identification.log_joining import align_column
 from paramreduce_cli.records import BoolArray, FloatArray, RawLog
 from paramreduce_cli.resources.scratch import allocate_matrix, stack_columns
 
@@ -106,6 +106,16 @@ def read_signals(
     if time is None:
         time = np.arange(len(z)) / (recorded_rate or 1.0)
     _check_time(log, columns.time, time)
+    kept = np.all(
+        [np.isfinite(part).all(axis=1) for part in (z, dz, ddz) if part is not None], axis=0
+    )
+    if not kept.all():  # other topics begin later or have gaps
+        if np.count_nonzero(kept) < _FEWEST:
+            raise DataError(
+                f"{log.source}: positions, speeds and {columns.time} have hardly any time in common."
+            )
+        time, z, tau = time[kept], z[kept], tau[kept]
+        dz, ddz = (None if part is None else part[kept] for part in (dz, ddz))
     turns = unwrap_positions(z) if section.outliers == "replace" else ()
     return _convert_to_joints(Signals(time, z, dz, ddz, tau, turns), section, len(names))
 
@@ -225,7 +235,8 @@ def _read_column(
 ) -> FloatArray:
     """Return a column of numbers; with ``missing`` some entries may be no numbers.
 
-    A column of another topic with times of its own is interpolated at the times of the recording.
+    A column of another topic with times of its own is interpolated at the times of the recording; entries outside its own
+    times are not numbers.
 
     Args:
         log: Log as read.
@@ -253,8 +264,12 @@ def _read_column(
         )
     if missing:
         wrong = np.flatnonzero(np.abs(column) >= _LARGEST)
-    if not wrong.size and rows is not None and column.size != rows[1]:
-        column = _align(log, name, column, rows[0], missing=missing)
+    if not wrong.size and rows is not None and rows[0] in log.columns:
+        column = align_column(log, name, rows[0])
+        if not np.any(np.isfinite(column)):
+            raise DataError(
+                f"{log.source}: columns {name} and {rows[0]} have no time in common. Were they recorded by other clocks?"
+            )
     if wrong.size:
         more = f", nor are {wrong.size - 1} others" if wrong.size > 1 else ""
         raise DataError(
@@ -264,23 +279,6 @@ def _read_column(
     if column.size < _FEWEST:
         raise DataError(f"{log.source}: {column.size} rows are too few; use {_FEWEST} or more.")
     return column
-
-
-def _align(log: RawLog, name: str, column: FloatArray, time: str, *, missing: bool) -> FloatArray:
-    """Return a column of another topic at the times of the recording, or as it is if its own times are not known.
-
-    Raises:
-        DataError: The column was not recorded at all of these times, and none may be missing.
-    """
-    aligned = align_column(log, name, time)
-    if aligned is None:
-        return column
-    if not missing and not np.all(np.isfinite(aligned)):
-        raise DataError(
-            f"{log.source}: column {name} was not recorded at all times of {time}. Set sampling.log.columns.time to its own "
-            f"times, {find_times(log, name, time)}."
-        )
-    return aligned
 
 
 def _check_time(log: RawLog, name: str, time: FloatArray) -> None:

@@ -108,8 +108,9 @@ def hint_at_state_noise(names: Sequence[str], cutoff: float, shifts: FloatArray)
     if not notable.size:
         return []
     worst = sorted(notable.tolist(), key=lambda k: -mean[k])[:_MOST_NAMED]
+    now = f"{cutoff:.3g} Hz" if np.isfinite(cutoff) else "none"
     listed = ", ".join(f"{names[k]} by {mean[k]:.2g}" for k in worst)
     return [
         f"Noise of the positions shifts {notable.size} of {len(names)} base parameters by more than a standard deviation "
-        f"({listed}). Lower sampling.log.state_cutoff, which is {cutoff:.3g} Hz, or record positions more finely."
+        f"({listed}). Lower sampling.log.state_cutoff, which is {now}, or record positions more finely."
     ]

@@ -20,6 +20,7 @@ from paramreduce_cli.multibody.noise import estimate_joint_noise
 from paramreduce_cli.multibody.observation import combine_factors
 from paramreduce_cli.multibody.orthogonal import solve_least_squares
 from paramreduce_cli.records import (
+    INERTIAL,
     Block,
     Consistency,
     Estimate,
@@ -78,7 +79,7 @@ def identify(
     consistency = _fit_consistent(identification, model, samples, deviation)
     hints = find_hints(model, training, full, full_fit, consistency, log)
     if log is not None:
-        shifts = _predict_shifts(log, model, _make_expansion(base), full.values, deviation)
+        shifts = _predict_shifts(log, model, _make_expansion(base), factors, deviation)
         hints += hint_at_state_noise(full.names, log.state_cutoff, shifts / full.deviations)
     if payload is not None:
         hints += find_payload_hints(model.mechanism, identification.payloads, payload, full)
@@ -175,25 +176,23 @@ def _estimate_parameters(
 
 
 def _predict_shifts(
-    log: MeasuredLog, model: Model, columns: FloatArray, values: FloatArray, deviation: FloatArray
+    log: MeasuredLog, model: Model, columns: FloatArray, factors: FloatArray, deviation: FloatArray
 ) -> FloatArray:
     """Return the shifts of the base parameters by each of several additional noises in the states, (n_noises, n)."""
     dynamics = Dynamics(model.mechanism, once=True)
     known = np.zeros(model.values.size)
+
+    def solve(whole: FloatArray) -> FloatArray:
+        """Return the parameters of weighted least squares."""
+        merged = _merge_factors(whole, columns, known)
+        return solve_least_squares(combine_factors(merged, deviation))
+
+    before = solve(factors)
     shifts = [
-        np.mean(
-            [
-                solve_least_squares(
-                    combine_factors(_merge_factors(factors, columns, known), deviation)
-                )
-                for factors in pair
-            ],
-            axis=0,
-        )
-        - values
+        np.mean([solve(noisy) for noisy in pair], axis=0) - before
         for pair in compute_noisy_factors(log, dynamics, np.isfinite(deviation))
     ]
-    return np.reshape(shifts, (-1, values.size))
+    return np.reshape(shifts, (-1, before.size))
 
 
 def _estimate_payload(
@@ -203,11 +202,20 @@ def _estimate_payload(
     if not section.payloads:
         return None
     factor = combine_factors(samples.estimation.compute_factors(), deviation)
+    parameters = model.mechanism.parameters
     indices = list_payload_columns(model.mechanism, model.values, section.payloads, factor)
-    fitted = [p.owner in section.payloads for p in model.mechanism.parameters]
+    if not any(parameters[k].kind in INERTIAL for k in indices):
+        listed = " and ".join(section.payloads)
+        warnings.warn(
+            f"the torques do not depend on the payload {listed}, so it is not identified alone",
+            ParamreduceWarning,
+            stacklevel=2,
+        )
+        return None
     columns = np.eye(model.values.size)[:, indices]
-    known = np.where(fitted, 0.0, model.values)
-    names = tuple(model.mechanism.parameters[k].name for k in indices)
+    known = model.values.copy()
+    known[indices] = 0.0
+    names = tuple(parameters[k].name for k in indices)
     return _estimate_parameters(section, names, columns, known, samples, deviation)[0]
 
 

@@ -117,3 +117,19 @@ def test_without_a_log_nothing_decides(tmp_path):
 
     with pytest.raises(ConfigError, match=r"is auto, but there is no sampling.log"):
         load_config(TWO_LINK, [f"drives={AUTO}"])
+
+
+@pytest.mark.parametrize("tremble", [0.0, 1e-12, 1e-9])
+def test_a_joint_may_rest_in_all_folds_but_one(tremble):
+    """Its columns are rounding, or hardly more, in the other folds."""
+    log = two_link_log(seconds=20.0, rate=100.0, noise=0.02)
+    still = np.arange(log["t"].size) > 250
+    rng = np.random.default_rng(0)
+    log["q2"] = np.where(still, log["q2"][250] + tremble * rng.normal(size=still.size), log["q2"])
+    config = robot()
+    dynamics = Dynamics(config.build_mechanism(), once=True)
+    logs = RawLogs(
+        (RawLog("log.csv", {key: log[key] for key in ("t", "q1", "q2", "tau1", "tau2")}, 2),), ()
+    )
+    found = process_logs_of_robot(dynamics, config, LogSection(files=["log.csv"]), logs)
+    assert np.isfinite(found.friction.error)

@@ -236,10 +236,38 @@ def test_torques_of_a_topic_that_begins_late_are_missing():
     assert np.array_equal(np.isnan(found.tau[:, 0]), found.time < 0.3)
 
 
-def test_positions_of_a_topic_that_begins_late_are_said():
+def test_only_common_times_of_topics_are_used():
+    """With the torques' times; positions begin later and end earlier."""
     other = {**TOPICS, "time": "/motors/time"}
-    with pytest.raises(DataError, match="to its own times, /states/time"):
-        read_signals(RawLog("x", topics(), None), section(columns=other), NAMES)
+    found = read_signals(RawLog("x", topics(), None), section(columns=other), NAMES)
+    assert found.time[0] >= 0
+    assert found.time[-1] <= 1.995
+    assert np.allclose(found.z, np.sin(np.outer(found.time, [1, 2])), atol=1e-5)
+
+
+def test_topics_of_equal_length_are_joined_by_their_times():
+    late = topics()
+    late["/motors/time"] = late["/states/time"] + 0.3
+    late |= {f"/motors/effort/{j}": np.cos(3 * j * late["/motors/time"]) for j in (1, 2)}
+    found = read_signals(RawLog("x", late, None), section(columns=TOPICS), NAMES)
+    seen = found.time > 0.31
+    assert np.allclose(found.tau[seen], np.cos(3 * np.outer(found.time[seen], [1, 2])), atol=1e-4)
+    assert np.isnan(found.tau[found.time < 0.29]).all()
+
+
+def test_gaps_of_a_topic_are_not_bridged():
+    gappy = topics()
+    kept = (gappy["/motors/time"] < 0.5) | (gappy["/motors/time"] > 1.0)
+    gappy |= {key: gappy[key][kept] for key in gappy if key.startswith("/motors")}
+    found = read_signals(RawLog("x", gappy, None), section(columns=TOPICS), NAMES)
+    assert np.isnan(found.tau[(found.time > 0.51) & (found.time < 0.99)]).all()
+
+
+def test_topics_without_common_times_are_said():
+    other = topics()
+    other["/motors/time"] = other["/motors/time"] + 100
+    with pytest.raises(DataError, match="have no time in common"):
+        read_signals(RawLog("x", other, None), section(columns=TOPICS), NAMES)
 
 
 def test_text_and_objects_that_nobody_asks_for(tmp_path):
