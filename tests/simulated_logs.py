@@ -12,6 +12,7 @@ from paramreduce_cli.excitation.fourier import evaluate_basis
 from paramreduce_cli.multibody.base_parameters import choose_base
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.multibody.random_states import draw_states
+from paramreduce_cli.records import RawLog, RawLogs
 
 CONFIG = Path(__file__).resolve().parents[1] / "configs" / "puma560_friction.yaml"
 RATE = 100.0
@@ -64,6 +65,16 @@ def simulated(seed):
         values[base.columns] + base.beta @ values[others],
         tuple(mechanism.parameters[k].kind.symbol for k in base.columns),
     )  # fmt: skip
+
+
+def record_encoder(log, tau, bits, extra=()):
+    """A recording of a simulated log: positions of an encoder, exact ones for no bits, and torques."""
+    step = 2 * np.pi / 2**bits if bits else 0.0
+    positions = np.round(log.z / step) * step if step else log.z
+    columns = {"t": log.time, **dict(extra)}
+    for name, values in (("q", positions), ("tau", tau)):
+        columns |= {f"{name}{j}": column for j, column in enumerate(values.T, 1)}
+    return RawLogs((RawLog("log.csv", columns, 2),), ())
 
 
 def along_axes(z, dz, ddz):

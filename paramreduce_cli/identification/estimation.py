@@ -181,7 +181,7 @@ class LinearFit:
     def noise(self) -> list[ColouredNoise]:
         """Coloured noise of each joint.
 
-        The fit absorbs slow noise. The model is chosen so that its expected residuals have the autocovariances of the residuals.
+        The fit absorbs slow noise. The chosen model predicts residuals with the observed autocovariances.
         """
         n_dof, n = self.deviation.size, self.rows.n_samples
         seen = [estimate_autocovariance([e[:, j] for e in self.residuals]) for j in range(n_dof)]

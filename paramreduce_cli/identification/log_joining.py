@@ -10,8 +10,7 @@ from paramreduce_cli.records import FloatArray, RawLog
 
 _LEAST_COMMON = 0.5
 """Share of the shortest part's duration in which all parts have to be recorded."""
-
-_GAP = 5.5
+GAP = 5.5
 """Usual time steps that make a gap."""
 
 
@@ -76,7 +75,7 @@ def align_column(log: RawLog, name: str, time: str) -> FloatArray:
     aligned = _interpolate(recorded_at, values, at)
     following = np.clip(np.searchsorted(recorded_at, at), 1, steps.size)
     outside = (at < recorded_at[0]) | (at > recorded_at[-1])
-    aligned[outside | (steps[following - 1] > _GAP * np.median(steps))] = np.nan
+    aligned[outside | (steps[following - 1] > GAP * np.median(steps))] = np.nan
     return aligned
 
 

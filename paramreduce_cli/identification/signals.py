@@ -21,14 +21,12 @@ from paramreduce_cli.errors import ConfigError, DataError
 from paramreduce_cli.fields.section import expand_per_joint
 from paramreduce_cli.identification import filters
 from paramreduce_cli.identification.encoder_wraps import unwrap_positions
-from paramreduce_cli.identification.log_joining import align_column
+from paramreduce_cli.identification.log_joining import GAP, align_column
 from paramreduce_cli.records import BoolArray, FloatArray, RawLog
 from paramreduce_cli.resources.scratch import allocate_matrix, stack_columns
 
 _EVEN = 0.005
 """Deviation of a time step from the usual one, a share, up to which time is even."""
-_GAP = 5.5
-"""Usual time steps that make a gap."""
 _FEWEST = 50
 """Samples of an uninterrupted motion that is used."""
 _AT_ONCE = 10_000
@@ -313,7 +311,7 @@ def resample_evenly(
         DataError: Nothing long enough is left.
     """
     step = float(np.median(np.diff(signals.time)))
-    gaps = np.flatnonzero(np.diff(signals.time) > _GAP * step)
+    gaps = np.flatnonzero(np.diff(signals.time) > GAP * step)
     edges = sorted({0, *(gaps + 1).tolist(), *steps, signals.time.size})
     pieces = [signals.slice_rows(slice(a, b)) for a, b in itertools.pairwise(edges)]
     kept = [piece for piece in pieces if piece.time.size >= _FEWEST]

@@ -9,11 +9,14 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from scipy import linalg
 
 from paramreduce_cli.identification import filters
 from paramreduce_cli.identification.measured_samples import LoggedSet
 from paramreduce_cli.identification.signals import Signals
 from paramreduce_cli.multibody.dynamics import Dynamics
+from paramreduce_cli.multibody.observation import combine_factors
+from paramreduce_cli.multibody.orthogonal import solve_least_squares
 from paramreduce_cli.records import BoolArray, FloatArray, MeasuredLog, MeasuredMotions, Spectra
 
 _N_PAIRS = 4
@@ -45,7 +48,37 @@ def estimate_position_noise(piece: Signals, rate: float, spectra: Spectra) -> Fl
     return density
 
 
-def compute_noisy_factors(
+def predict_shifts(
+    log: MeasuredLog,
+    dynamics: Dynamics,
+    columns: FloatArray,
+    factors: FloatArray,
+    deviation: FloatArray,
+) -> FloatArray:
+    """Return the shifts of parameters by each of several additional noises in the states, (n_noises, p).
+
+    There are no rows if nothing is known of the noise, or if the log is too long.
+
+    Args:
+        log: Log, with the density of the noise of its positions.
+        dynamics: Dynamics of the robot.
+        columns: Matrix that expresses the model's columns by those of the standard parameters, (n_standard, p).
+        factors: Factors of [W | tau] of the training samples by fold and joint.
+        deviation: Divisor of the torques of each joint, infinite where none is measured, (n_dof,).
+    """
+    transform = linalg.block_diag(columns, 1.0)
+
+    def solve(whole: FloatArray) -> FloatArray:
+        """Return the parameters of weighted least squares."""
+        return solve_least_squares(combine_factors(whole @ transform, deviation))
+
+    before = solve(factors)
+    pairs = _compute_noisy_factors(log, dynamics, np.isfinite(deviation))
+    shifts = [np.mean([solve(noisy) for noisy in pair], axis=0) - before for pair in pairs]
+    return np.reshape(shifts, (-1, before.size))
+
+
+def _compute_noisy_factors(
     log: MeasuredLog, dynamics: Dynamics, measured: BoolArray
 ) -> list[tuple[FloatArray, FloatArray]]:
     """Return the triangular factors of the training samples with as much noise again in the states, for pairs of noises

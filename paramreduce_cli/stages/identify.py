@@ -14,7 +14,7 @@ from paramreduce_cli.identification.payload_estimation import (
     find_payload_hints,
     list_payload_columns,
 )
-from paramreduce_cli.identification.state_noise import compute_noisy_factors, hint_at_state_noise
+from paramreduce_cli.identification.state_noise import hint_at_state_noise, predict_shifts
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.multibody.noise import estimate_joint_noise
 from paramreduce_cli.multibody.observation import combine_factors
@@ -79,7 +79,8 @@ def identify(
     consistency = _fit_consistent(identification, model, samples, deviation)
     hints = find_hints(model, training, full, full_fit, consistency, log)
     if log is not None:
-        shifts = _predict_shifts(log, model, _make_expansion(base), factors, deviation)
+        dynamics = Dynamics(model.mechanism, once=True)
+        shifts = predict_shifts(log, dynamics, _make_expansion(base), factors, deviation)
         hints += hint_at_state_noise(full.names, log.state_cutoff, shifts / full.deviations)
     if payload is not None:
         hints += find_payload_hints(model.mechanism, identification.payloads, payload, full)
@@ -173,26 +174,6 @@ def _estimate_parameters(
         folds=_cross_validate(factors, np.linalg.norm(whole[..., -1], axis=2), deviation),
     )
     return estimate, fitted
-
-
-def _predict_shifts(
-    log: MeasuredLog, model: Model, columns: FloatArray, factors: FloatArray, deviation: FloatArray
-) -> FloatArray:
-    """Return the shifts of the base parameters by each of several additional noises in the states, (n_noises, n)."""
-    dynamics = Dynamics(model.mechanism, once=True)
-    known = np.zeros(model.values.size)
-
-    def solve(whole: FloatArray) -> FloatArray:
-        """Return the parameters of weighted least squares."""
-        merged = _merge_factors(whole, columns, known)
-        return solve_least_squares(combine_factors(merged, deviation))
-
-    before = solve(factors)
-    shifts = [
-        np.mean([solve(noisy) for noisy in pair], axis=0) - before
-        for pair in compute_noisy_factors(log, dynamics, np.isfinite(deviation))
-    ]
-    return np.reshape(shifts, (-1, before.size))
 
 
 def _estimate_payload(

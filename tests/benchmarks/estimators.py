@@ -14,8 +14,7 @@ from paramreduce_cli.identification.estimation import collect_rows, fit_robustly
 from paramreduce_cli.identification.measured_samples import LoggedSet
 from paramreduce_cli.identification.processing import process_logs
 from paramreduce_cli.multibody.noise import estimate_joint_noise
-from paramreduce_cli.records import RawLog, RawLogs
-from tests.simulated_logs import arm, coloured, simulated
+from tests.simulated_logs import arm, coloured, record_encoder, simulated
 
 _NOISE = 0.03
 _BITS = 14
@@ -30,17 +29,10 @@ _FILTERS = {
 def process(log, tau, bits, **cutoffs):
     """The log as the tool sees it; positions are exact if there are no bits."""
     _, dynamics, base, _ = arm()
-    step = 2 * np.pi / 2**bits if bits else 0.0
-    positions = np.round(log.z / step) * step if step else log.z
-    columns = {f"q{j}": values for j, values in enumerate(positions.T, 1)}
-    columns |= {"t": log.time} | {f"tau{j}": values for j, values in enumerate(tau.T, 1)}
     section = LogSection(files="log.csv", held_out=1 - _LEARNED, **cutoffs)
     columns_of = make_column_function(dynamics, np.array(base.columns))
     return process_logs(
-        RawLogs((RawLog("log.csv", columns, 2),), ()),
-        section,
-        log.names,
-        compute_columns=columns_of,
+        record_encoder(log, tau, bits), section, log.names, compute_columns=columns_of
     )
 
 
@@ -54,8 +46,21 @@ def collect(log):
     )
 
 
-def factorise(X, tau):
-    return np.array([[np.linalg.qr(np.column_stack([X[:, j], tau[:, j]]), mode="r") for j in range(tau.shape[1])]])  # fmt: skip
+def factorise(W, tau, folds):
+    n = len(tau)
+    return np.array(
+        [
+            [np.linalg.qr(np.column_stack([W[rows, j], tau[rows, j]]), mode="r") for j in range(tau.shape[1])]
+            for rows in (slice(k * n // folds, (k + 1) * n // folds) for k in range(folds))
+        ]
+    )  # fmt: skip
+
+
+def fit_by_noise(rows):
+    """Weighted fit; each joint's weight is that of its noise."""
+    X, tau = np.concatenate(rows.X), np.concatenate(rows.tau)
+    scale = np.sqrt(np.mean(tau**2, axis=0))
+    return fit_weighted(rows, estimate_joint_noise(factorise(X, tau, 1), scale, len(tau)))
 
 
 def fit_total(X, tau, deviation):
@@ -71,9 +76,8 @@ def fit_all(rows, instruments):
     """Parameters and seconds of each estimator."""
     X, tau = np.concatenate(rows.X), np.concatenate(rows.tau)
     Z = np.concatenate(instruments.X)
-    scale = np.sqrt(np.mean(tau**2, axis=0))
-    deviation = estimate_joint_noise(factorise(X, tau), scale, len(tau))
-    weighted = fit_weighted(rows, deviation).parameters
+    fit = fit_by_noise(rows)
+    weighted, deviation = fit.parameters, fit.deviation
 
     def fit_instrumental():
         weights = 1 / deviation**2
@@ -114,10 +118,7 @@ def print_estimators(draws):
             exact = collect(process(log, tau, 0, **same))
             fits = fit_all(rows, exact)
             if unit is None:
-                X, y = np.concatenate(rows.X), np.concatenate(rows.tau)
-                scale = np.sqrt(np.mean(y**2, axis=0))
-                fit = fit_weighted(rows, estimate_joint_noise(factorise(X, y), scale, len(y)))
-                unit = np.sqrt(np.diag(fit.compute_covariance()))
+                unit = np.sqrt(np.diag(fit_by_noise(rows).compute_covariance()))
             for estimator, (values, seconds) in fits.items():
                 wrong = log.X[held_out] @ (values - log.values)
                 table.setdefault((name, estimator), []).append(

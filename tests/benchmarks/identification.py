@@ -8,11 +8,7 @@ import warnings
 
 import numpy as np
 
-from paramreduce_cli.config.log_settings import LogSection
-from paramreduce_cli.identification.band_scoring import make_column_function
-from paramreduce_cli.identification.estimation import Rows, collect_rows, fit_weighted
-from paramreduce_cli.identification.measured_samples import LoggedSet
-from paramreduce_cli.identification.processing import process_logs
+from paramreduce_cli.identification.estimation import Rows, fit_weighted
 from paramreduce_cli.identification.residual_hints import find_residual_hints
 from paramreduce_cli.identification.torque_hints import hint_at_gravity, hint_at_unit
 from paramreduce_cli.judgement.cross_validation import (
@@ -23,18 +19,18 @@ from paramreduce_cli.judgement.cross_validation import (
 from paramreduce_cli.multibody.noise import estimate_joint_noise
 from paramreduce_cli.multibody.observation import combine_factors
 from paramreduce_cli.multibody.orthogonal import solve_least_squares
-from paramreduce_cli.records import INERTIAL, RawLog, RawLogs
+from paramreduce_cli.records import INERTIAL
 from paramreduce_cli.reduction.criteria.torque import TorqueObjective
 from paramreduce_cli.reduction.fitting import fit
 from paramreduce_cli.reduction.problem import SelectionProblem
 from paramreduce_cli.reduction.task import Effort, SelectionTask, run
-from tests.benchmarks.estimators import print_estimators
+from tests.benchmarks.estimators import collect, factorise, fit_by_noise, print_estimators, process
 from tests.simulated_logs import RATE, along_axes, arm, coloured, simulated
 
 _NOISE = 0.03
 """Standard deviation of the noise, a share of each joint's torques."""
-_ENCODER = 2 * np.pi / 2**19
-"""Step of the recorded positions, rad."""
+_BITS = 19
+"""Of the encoder that positions are recorded by."""
 _LEFT_OUT = {"coulomb": "fc", "viscous": "fv", "inertia": "Ia"}
 _SAID = {
     "unit": "in another unit",
@@ -81,19 +77,7 @@ def fit_exact_states(log, tau):
 
 def fit_recorded_positions(log, tau):
     """Fit to the first 12 s, states and cut-offs by the tool from positions of an encoder."""
-    _, dynamics, base, _ = arm()
-    columns = {f"q{j}": np.round(z / _ENCODER) * _ENCODER for j, z in enumerate(log.z.T, 1)}
-    columns |= {"t": log.time} | {f"tau{j}": values for j, values in enumerate(tau.T, 1)}
-    found = process_logs(
-        RawLogs((RawLog("log.csv", columns, 2),), ()), LogSection(files="log.csv"), log.names,
-        compute_columns=make_column_function(dynamics, np.array(base.columns)),
-    )  # fmt: skip
-    rows = LoggedSet(found.training, found, dynamics, "log.csv")
-    expansion = np.eye(dynamics.mechanism.n_parameters)[:, base.columns]
-    rows = collect_rows(rows.iterate_blocks(), expansion, np.zeros(len(expansion)), rows.n_samples)
-    X, tau = np.concatenate(rows.X), np.concatenate(rows.tau)
-    scale = np.sqrt(np.mean(tau**2, axis=0))
-    return fit_weighted(rows, estimate_joint_noise(factorise(X, tau, 1), scale, rows.n_samples))
+    return fit_by_noise(collect(process(log, tau, _BITS)))
 
 
 def coverage(fit_log, pole, count):
@@ -188,16 +172,6 @@ def right(case, pole, count):
             _SAID[case] in found[0] if case in _SAID and found else case == "clean" and not found
         )
     return good / count
-
-
-def factorise(W, tau, folds):
-    n = len(tau)
-    return np.array(
-        [
-            [np.linalg.qr(np.column_stack([W[rows, j], tau[rows, j]]), mode="r") for j in range(tau.shape[1])]
-            for rows in (slice(k * n // folds, (k + 1) * n // folds) for k in range(folds))
-        ]
-    )  # fmt: skip
 
 
 def compare_sizes(pole, seed):

@@ -80,7 +80,7 @@ def test_the_noise_that_a_fit_absorbs_by_brute_force():
 
 
 def test_degrees_of_freedom_follow_from_how_broad_a_signal_is():
-    """The noise at one harmonic has two, and one more as its time is short; the noise below white noise has many."""
+    """A harmonic depends on the noise at one frequency, with two degrees of freedom (three as its duration is finite)."""
     n = 512
     noise, one = [ColouredNoise(np.zeros(0), 2.0)], np.ones(1)
     harmonic = np.cos(2 * np.pi * 8 * np.arange(n) / n)[:, None, None]
@@ -109,7 +109,7 @@ def test_folds_of_one_motion_are_joined():
 
 @pytest.mark.parametrize("pole", [0.0, 0.9])
 def test_intervals_hold_the_truth(pole):
-    """Of few logs; `make identification` does it with two hundred."""
+    """Of few logs; `make identification` does it with a hundred."""
     hits = []
     for seed in range(8):
         log = simulated(seed)

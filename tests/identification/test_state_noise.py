@@ -2,15 +2,13 @@
 
 import numpy as np
 import pytest
-from simulated_logs import RATE, arm, coloured, simulated
+from simulated_logs import RATE, arm, coloured, record_encoder, simulated
 
 from paramreduce_cli.config.log_settings import LogSection
 from paramreduce_cli.identification.measured_samples import LoggedSet
 from paramreduce_cli.identification.processing import process_logs
-from paramreduce_cli.identification.state_noise import compute_noisy_factors, hint_at_state_noise
+from paramreduce_cli.identification.state_noise import hint_at_state_noise, predict_shifts
 from paramreduce_cli.multibody.observation import combine_factors
-from paramreduce_cli.multibody.orthogonal import solve_least_squares
-from paramreduce_cli.records import RawLog, RawLogs
 
 CUTOFFS = {"state_cutoff": 10.0, "torque_cutoff": 17.0}
 
@@ -18,35 +16,21 @@ CUTOFFS = {"state_cutoff": 10.0, "torque_cutoff": 17.0}
 def process(bits, seed=100, velocity=False):
     """A log of positions from an encoder, processed."""
     log = simulated(seed)
-    step = 2 * np.pi / 2**bits
-    columns = {f"q{j}": np.round(z / step) * step for j, z in enumerate(log.z.T, 1)}
     tau = log.tau + coloured(log.tau.shape, 0.03 * np.std(log.tau, axis=0), 0.0, seed)
-    columns |= {"t": log.time} | {f"tau{j}": values for j, values in enumerate(tau.T, 1)}
-    if velocity:
-        columns |= {f"dq{j}": speeds for j, speeds in enumerate(log.dz.T, 1)}
+    speeds = {f"dq{j}": values for j, values in enumerate(log.dz.T, 1)} if velocity else {}
     section = {"columns": {"velocity": "dq{}"}} if velocity else {}
     section = LogSection(files="log.csv", **CUTOFFS, **section)
-    return process_logs(RawLogs((RawLog("log.csv", columns, 2),), ()), section, log.names)
+    return process_logs(record_encoder(log, tau, bits, speeds), section, log.names)
 
 
-def predict_shifts(log):
+def predict(log):
     """Shifts of the base parameters by additional noise, in units of what 3 % noise of torques costs."""
     _, dynamics, base, _ = arm()
-    measured = np.ones(6, dtype=bool)
-
-    def fit(factors):
-        kept = [*base.columns, factors.shape[-1] - 1]
-        factor = combine_factors(factors[..., kept], np.ones(6))
-        return solve_least_squares(factor), np.sqrt(
-            np.diag(np.linalg.inv(factor[:, :-1].T @ factor[:, :-1]))
-        )
-
-    pairs = compute_noisy_factors(log, dynamics, measured)
-    values, sizes = zip(*(fit(factors) for pair in pairs for factors in pair), strict=True)
-    means = np.reshape(values, (len(pairs), 2, -1)).mean(axis=1)
-
-    own, _ = fit(LoggedSet(log.training, log, dynamics, "log.csv").compute_factors())
-    return (means - own) / sizes[0]
+    columns = np.eye(dynamics.mechanism.n_parameters)[:, base.columns]
+    factors = LoggedSet(log.training, log, dynamics, "log.csv").compute_factors()
+    shifts = predict_shifts(log, dynamics, columns, factors, np.ones(6))
+    X = combine_factors(factors[..., base.columns], np.ones(6))
+    return shifts / np.sqrt(np.diag(np.linalg.inv(X.T @ X)))
 
 
 @pytest.mark.parametrize("bits", [12, 16])
@@ -60,12 +44,12 @@ def test_the_noise_of_an_encoder_is_measured(bits):
 def test_nothing_is_known_of_the_noise_of_recorded_speeds():
     log = process(16, velocity=True)
     assert not log.position_noise.any()
-    assert compute_noisy_factors(log, arm()[1], np.ones(6, dtype=bool)) == []
+    assert len(predict(log)) == 0
 
 
 def test_a_coarse_encoder_with_a_high_cutoff_is_hinted_at():
     names = [f"p{k}" for k in range(len(arm()[2].columns))]
-    shifts = predict_shifts(process(12))
+    shifts = predict(process(12))
     (text,) = hint_at_state_noise(names, 10.0, shifts)
     assert "Noise of the positions shifts" in text
     assert "Lower sampling.log.state_cutoff, which is 10 Hz" in text
@@ -73,7 +57,7 @@ def test_a_coarse_encoder_with_a_high_cutoff_is_hinted_at():
 
 def test_a_fine_encoder_gives_no_hint():
     names = [f"p{k}" for k in range(len(arm()[2].columns))]
-    assert hint_at_state_noise(names, 10.0, predict_shifts(process(19))) == []
+    assert hint_at_state_noise(names, 10.0, predict(process(19))) == []
 
 
 def test_shifts_that_noise_makes_by_chance_are_not_hinted_at():
