@@ -15,7 +15,7 @@ from paramreduce_cli.errors import Key
 from paramreduce_cli.fields.names import Problem, UnknownNameError
 from paramreduce_cli.fields.numbers import RATHER_DEGREES
 from paramreduce_cli.fields.section import expand_per_joint
-from paramreduce_cli.records import Kind, Parameter
+from paramreduce_cli.records import WITH_SIGN, Parameter
 from paramreduce_cli.robots import drives, payloads
 from paramreduce_cli.robots.inertia import compute_pseudo_inertia, is_positive_semidefinite
 
@@ -74,13 +74,20 @@ def _check_payloads_and_drives(config: Config) -> Iterator[Problem]:
         if name not in config.payloads:
             error = UnknownNameError("payload", name, list(config.payloads))
             yield ("identification", "payloads", k), error
-    for key, message in drives.find_drive_problems(config.drives, bodies.list_coordinates()):
+    for key, message in drives.find_drive_problems(
+        config.drives, bodies.list_coordinates(), closed=bodies.closed
+    ):
         yield ("drives", *key), message
     for name, drive in config.drives.items():
         if drive.friction == "auto" and config.sampling.log is None:
             yield (
                 ("drives", name, "friction"),
                 "is auto, but there is no sampling.log to decide; give values or unknown",
+            )
+        if drive.load is not None and drive.friction != "auto" and not config.has_masses():
+            yield (
+                ("drives", name, "load"),
+                "needs the torques of gravity, and no body has a mass; give values of the bodies, or friction: auto",
             )
 
 
@@ -194,7 +201,7 @@ def _check_simulation(config: Config) -> Iterator[Problem]:
     if section.duration / section.step > _MOST_STEPS:
         yield (*path, "step"), f"makes more than {_MOST_STEPS} samples of {section.duration:g} s"
     for name, drive in config.list_drives().items():
-        if {Kind.COULOMB, Kind.STRIBECK} & set(drive.get_values()) and not drive.smoothing:
+        if set(WITH_SIGN) & set(drive.get_values()) and not drive.smoothing:
             yield ("drives",), f"{name} needs a smoothing: a sign that jumps cannot be simulated"
     sampling = config.sampling
     if any(sampling.list_recordings().values()) or sampling.symmetries:

@@ -52,6 +52,7 @@ def describe_friction(search: FrictionSearch | None) -> Iterator[str]:
         ("Stribeck", np.isfinite(search.stribeck_velocity)),
         ("asymmetric viscous", search.asymmetry),
         ("quadratic", search.quadratic),
+        ("load-dependent", search.load),
     ]
     for term, chosen in terms:
         names = [name for name, flag in zip(search.drives, chosen, strict=True) if flag]

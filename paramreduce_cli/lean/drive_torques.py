@@ -12,7 +12,7 @@ _SCALARS = OddFunctions(Scalar.sign, Scalar.take_tanh)
 
 
 def add_drives(
-    tree: Tree, symbols: Symbols, torques: list[Scalar], *, moving: bool
+    tree: Tree, symbols: Symbols, torques: list[Scalar], gravity: list[Scalar], *, moving: bool
 ) -> list[Scalar]:
     """Return the torques of the joints with the torques of their drives added.
 
@@ -20,15 +20,17 @@ def add_drives(
         tree: Tree with the drives.
         symbols: Symbols of the model.
         torques: Torques of the bodies, (n_q,).
+        gravity: Nominal torques of gravity, (n_q,), empty if no friction depends on them.
         moving: Whether joints accelerate.
     """
     joints = range(len(tree.joints))
     states = [[symbols.read_coordinate(i, derivative) for i in joints] for derivative in range(3)]
+    states.append(gravity)
     result = list(torques)
     for drive, columns in tree.drives:
         force = symbols.make_constant(0.0)
         for kind, position in columns.items():
-            if moving or kind is not Kind.ROTOR:
+            if (moving or kind is not Kind.ROTOR) and (gravity or kind is not Kind.LOAD):
                 unit = express_unit_force(kind, drive, states, _SCALARS)
                 force = force + symbols.read_parameter(position) * unit
         for i, weight in _iterate_weights(drive.weights.tolist()):

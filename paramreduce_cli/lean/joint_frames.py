@@ -58,6 +58,8 @@ class Tree:
     """Whether it is a part of a larger tree, whose motion carries it: the base moves."""
     drives: tuple[tuple[Drive, Mapping[Kind, int]], ...] = ()
     """Drives with the positions of their parameters; a part of a tree has none."""
+    nominal: FloatArray | None = None
+    """Nominal values of the parameters, (n_parameters,), if friction depends on the load."""
 
 
 def choose_frames(mechanism: Mechanism) -> Tree:
@@ -95,7 +97,13 @@ def choose_frames(mechanism: Mechanism) -> Tree:
             )
         )
     drives = tuple((drive, mechanism.find_drive_columns(drive)) for drive in mechanism.drives)
-    return Tree(tuple(joints), mechanism.gravity, mechanism.n_parameters, drives=drives)
+    return Tree(
+        tuple(joints),
+        mechanism.gravity,
+        mechanism.n_parameters,
+        drives=drives,
+        nominal=mechanism.nominal,
+    )
 
 
 def _has_tilt(rotation: FloatArray) -> bool:

@@ -81,6 +81,28 @@ class Symbols:
         return Inertia(zero, (zero, zero, zero), *[zero] * 6)
 
 
+class RestSymbols(Symbols):
+    """The inputs of a tree at rest whose parameters are known numbers.
+
+    Args:
+        graph: Graph of the symbols.
+        tree: Tree of the models.
+        values: Values of the parameters, (n_parameters,).
+    """
+
+    def __init__(self, graph: Graph, tree: Tree, values: FloatArray) -> None:
+        super().__init__(graph, tree)
+        self._values = values
+
+    def read_coordinate(self, i: int, derivative: int) -> Scalar:
+        """Return the coordinate of joint i in the sign of the robot's description, or zero for its derivatives."""
+        return self.make_constant(0.0) if derivative else super().read_coordinate(i, derivative)
+
+    def read_parameter(self, position: int) -> Scalar:
+        """Return the value of a parameter."""
+        return self.make_constant(float(self._values[position]))
+
+
 @dataclass(frozen=True)
 class Angle:
     """An angle about z and its derivatives; its constant part is kept apart."""
@@ -128,22 +150,20 @@ class Kinematics:
     Args:
         tree: The tree.
         choices: Formulations, one per joint.
-        graph: Graph that the expressions are added to.
+        symbols: Inputs of the model, in the graph that expressions are added to.
         moving: Whether joints accelerate.
-        dropped: Positions of parameters that are zero.
     """
 
     def __init__(
         self,
         tree: Tree,
         choices: Sequence[JointFormulation],
-        graph: Graph,
+        symbols: Symbols,
         *,
         moving: bool = True,
-        dropped: Collection[int] = (),
     ) -> None:
-        self.tree, self.choices, self.graph = tree, choices, graph
-        self.symbols = Symbols(graph, tree, dropped)
+        self.tree, self.choices, self.graph = tree, choices, symbols.graph
+        self.symbols = symbols
         self._zero = self.symbols.make_constant(0.0)
         self._none = self.symbols.make_vector((0, 0, 0))
         self._moving = moving

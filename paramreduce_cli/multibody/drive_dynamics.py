@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import casadi as ca
 import numpy as np
 
-from paramreduce_cli.records import Drive, FloatArray, Kind, Mechanism
+from paramreduce_cli.records import WITH_SIGN, Drive, FloatArray, Kind, Mechanism
 
 
 class OddFunctions(NamedTuple):
@@ -37,7 +37,7 @@ def express_unit_force(
     Args:
         kind: Kind of the parameter, one of :data:`paramreduce_cli.records.DRIVE`.
         drive: The drive.
-        states: Generalised coordinates q, velocities dq and accelerations ddq, (n_q,) each.
+        states: Generalised coordinates q, velocities dq, accelerations ddq and nominal torques of gravity, (n_q,) each.
         odd: Functions of these scalars.
 
     Raises:
@@ -68,6 +68,15 @@ def _express_magnitude(drive: Drive, states: Sequence[Sequence[Any]], odd: OddFu
     return speed * odd.sign(speed)
 
 
+def _express_load_friction(drive: Drive, states: Sequence[Sequence[Any]], odd: OddFunctions) -> Any:
+    """Return the factor of friction that grows with the load, the nominal force of gravity along the motion [Hamon2010].
+
+    Of the forces along a motion of several coordinates that explain their torques, the least-squares one is taken.
+    """
+    load = sum_along(drive, states[3]) * (1 / float(drive.weights @ drive.weights))
+    return load * odd.sign(load) * _express_friction_sign(drive, states, odd)
+
+
 def smooth_friction(mechanism: Mechanism, speeds: FloatArray) -> Mechanism:
     """Return the mechanism with a smooth sign in Coulomb friction, so that gradients exist; a mechanism without such
     friction is returned as it is.
@@ -76,9 +85,7 @@ def smooth_friction(mechanism: Mechanism, speeds: FloatArray) -> Mechanism:
         mechanism: The mechanism.
         speeds: Largest speeds of the independent coordinates, (n_dof,), rad/s or m/s.
     """
-    if all(
-        parameter.kind not in (Kind.COULOMB, Kind.STRIBECK) for parameter in mechanism.parameters
-    ):
+    if all(parameter.kind not in WITH_SIGN for parameter in mechanism.parameters):
         return mechanism
     fastest = np.full(mechanism.n_q, speeds.max())
     fastest[list(mechanism.independent)] = speeds
@@ -107,5 +114,6 @@ _FORCES: dict[Kind, Callable[[Drive, Sequence[Sequence[Any]], OddFunctions], Any
     Kind.QUADRATIC: lambda drive, states, odd: (
         sum_along(drive, states[1]) * _express_magnitude(drive, states, odd)
     ),
+    Kind.LOAD: _express_load_friction,
 }
-"""Force along a drive's motion for a unit value of each parameter; states are q, dq and ddq."""
+"""Force along a drive's motion for a unit value of each parameter; states are q, dq, ddq and torques of gravity."""

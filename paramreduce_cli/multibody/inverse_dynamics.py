@@ -49,6 +49,29 @@ def express_torques(
     Returns:
         One expression per joint, N m or N.
     """
+    tau = _express_body_torques(mechanism, q, dq, ddq, phi)
+    vectors = (q, dq, ddq, express_nominal_gravity(mechanism, q))
+    states = [[x[i] for i in range(mechanism.n_q)] for x in vectors]
+    for drive in mechanism.drives:
+        for kind, column in mechanism.find_drive_columns(drive).items():
+            along = phi[column] * express_unit_force(kind, drive, states, CASADI)
+            tau = [t + weight * along for t, weight in zip(tau, drive.weights, strict=True)]
+    return tau
+
+
+def express_nominal_gravity(mechanism: Mechanism, q: ca.SX) -> ca.SX:
+    """Return the torques of gravity that the nominal parameters have, (n_q,); zero if there are none."""
+    still = ca.SX(mechanism.n_q, 1)
+    if mechanism.nominal is None:
+        return still
+    nominal = ca.SX(ca.DM(mechanism.nominal))
+    return ca.vertcat(*_express_body_torques(mechanism, q, still, still, nominal))
+
+
+def _express_body_torques(
+    mechanism: Mechanism, q: ca.SX, dq: ca.SX, ddq: ca.SX, phi: ca.SX
+) -> list[ca.SX]:
+    """Return the torques and forces of the joints that the bodies and payloads need for a motion, without drives."""
     joints = make_joint_motions(mechanism, q)
     rates = _propagate_rates(mechanism, joints, dq, ddq)
     forces, moments = [ZERO] * mechanism.n_q, [ZERO] * mechanism.n_q
@@ -64,11 +87,6 @@ def express_torques(
             force, moment = joints[i].to_parent(force), joints[i].to_parent(moment)
             forces[parent] = add(forces[parent], force)
             moments[parent] = add(moments[parent], add(moment, cross(joints[i].origin, force)))
-    states = [[x[i] for i in range(mechanism.n_q)] for x in (q, dq, ddq)]
-    for drive in mechanism.drives:
-        for kind, column in mechanism.find_drive_columns(drive).items():
-            along = phi[column] * express_unit_force(kind, drive, states, CASADI)
-            tau = [t + weight * along for t, weight in zip(tau, drive.weights, strict=True)]
     return tau
 
 

@@ -12,6 +12,7 @@ import casadi as ca
 import numpy as np
 
 from paramreduce_cli.multibody.drive_dynamics import CASADI, express_unit_force
+from paramreduce_cli.multibody.inverse_dynamics import express_nominal_gravity
 from paramreduce_cli.multibody.kinematics import express_cosine_and_sine
 from paramreduce_cli.records import BASE, INERTIAL, Body, FloatArray, Mechanism
 
@@ -61,7 +62,9 @@ def express_regressor(mechanism: Mechanism, columns: Sequence[int] | None = None
 
 def _express_drive_rows(mechanism: Mechanism, q: ca.MX, dq: ca.MX, ddq: ca.MX) -> dict[int, ca.MX]:
     """Return the rows of the drives' parameters, (1, n_q) each, by column."""
-    vectors = [[x[i] for i in range(mechanism.n_q)] for x in (q, dq, ddq)]
+    at = ca.SX.sym("q", mechanism.n_q)
+    gravity = ca.Function("gravity", [at], [express_nominal_gravity(mechanism, at)])(q)
+    vectors = [[x[i] for i in range(mechanism.n_q)] for x in (q, dq, ddq, gravity)]
     rows = {}
     for drive in mechanism.drives:
         weights = ca.MX(ca.sparsify(ca.DM(drive.weights[None])))

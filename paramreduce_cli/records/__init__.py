@@ -55,6 +55,7 @@ from paramreduce_cli.records.parameters import (
     DRIVE,
     INERTIAL,
     LAST,
+    WITH_SIGN,
     Kind,
     Parameter,
     order_by_preference,

@@ -149,6 +149,11 @@ class FrictionSearch:
     """Whether viscous friction differs by direction, (n_drives,)."""
     quadratic: BoolArray
     """Whether there is friction that is quadratic in the speed, (n_drives,)."""
+    load: BoolArray
+    """Whether there is friction that grows with the load, (n_drives,)."""
+    bodies: FloatArray
+    """Parameters of the bodies and payloads, fitted with this friction, SI, (n_inertial,): the load is their torque of gravity.
+    Those that are no base parameters are zero."""
     error: float
     """Relative error of torques on left-out folds with this friction."""
     usual_error: float

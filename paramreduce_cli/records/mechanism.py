@@ -194,6 +194,9 @@ class Mechanism:
     """Rotors, friction and springs."""
     frames: str = ""
     """Frames of the table, in words."""
+    nominal: FloatArray | None = None
+    """Nominal values of the parameters, (n_parameters,): friction that depends on the load grows with the torques of gravity
+    that these have. None without such friction."""
 
     @property
     def n_q(self) -> int:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field, PrivateAttr, model_validator
 
 from paramreduce_cli.fields.numbers import Number
 from paramreduce_cli.fields.section import (
@@ -22,6 +22,7 @@ from paramreduce_cli.records import (
     BoolArray,
     FloatArray,
     FrictionSearch,
+    Kind,
     Mechanism,
     Parameter,
 )
@@ -89,6 +90,9 @@ class Robot(Section):
     unmeasured: list[Name] = []
     """Independent coordinates whose torques are not measured, such as those of a floating base: base parameters, fits and errors leave them out."""
 
+    _bodies: FloatArray | None = PrivateAttr(None)
+    """Parameters of the bodies and payloads that were found with the friction, SI; None without that."""
+
     @property
     def n_dof(self) -> int:
         """Number of independent coordinates."""
@@ -99,13 +103,13 @@ class Robot(Section):
 
     def build_mechanism(self) -> Mechanism:
         """Return the mechanism as it is described; loops are not assembled yet."""
-        bodies = self.description.bodies
+        bodies, parameters = self.description.bodies, self.list_parameters()
         coordinates, rigid = bodies.list_coordinates(), bodies.build_bodies()
         index = {body.name: k for k, body in enumerate(rigid)}
         return Mechanism(
             robot=self.robot,
             bodies=rigid,
-            parameters=self.list_parameters(),
+            parameters=parameters,
             gravity=np.array(self.description.gravity, dtype=float),
             lengths=bodies.list_lengths(),
             table=bodies.build_table(),
@@ -115,7 +119,17 @@ class Robot(Section):
                 s.build_drive(name, coordinates) for name, s in self.list_drives().items()
             ),
             frames=bodies.frames,
+            nominal=self._get_nominal(parameters),
         )
+
+    def _get_nominal(self, parameters: Sequence[Parameter]) -> FloatArray | None:
+        """Return the nominal parameters if friction depends on the load: those found with the friction, or the robot's."""
+        if all(parameter.kind is not Kind.LOAD for parameter in parameters):
+            return None
+        values = self.get_values()
+        if self._bodies is not None:
+            values[: self._bodies.size] = self._bodies
+        return values
 
     def stretch(self, stretch: Callable[[float], float]) -> Robot:
         """Return the robot with other lengths, as far as lengths have names."""
@@ -137,7 +151,9 @@ class Robot(Section):
         drives = self.list_drives()
         for k, name in enumerate(search.drives):
             drives[name] = drives[name].apply_friction(search, k)
-        return self.model_copy(update={"drives": drives})
+        result = self.model_copy(update={"drives": drives})
+        result._bodies = search.bodies
+        return result
 
     def list_parameters(self) -> tuple[Parameter, ...]:
         """Return all parameters: body by body, then payload by payload, then drive by drive."""
@@ -164,6 +180,12 @@ class Robot(Section):
         rigid = [body.get_values() for body in self.get_body_parameters().values()]
         driven = [drive.get_values() for drive in self.list_drives().values()]
         return np.array([value for values in rigid + driven for value in values.values()])
+
+    def has_masses(self) -> bool:
+        """Whether the values of the parameters include a mass or a first moment."""
+        kinds = [parameter.kind for parameter in self.list_parameters()]
+        first = [kind in (Kind.M, Kind.MX, Kind.MY, Kind.MZ) for kind in kinds]
+        return bool(np.any(self.get_values()[first]))
 
     def find_measured(self) -> BoolArray:
         """Return which independent coordinates have measured torques, (n_dof,)."""

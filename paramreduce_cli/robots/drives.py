@@ -49,12 +49,14 @@ class DriveSection(Section):
     """Viscous friction with the same sign for both directions, N m s/rad (N s/m): friction that differs by direction."""
     quadratic: Value | None = None
     """Friction that goes as speed times its magnitude, N m s^2/rad^2 (N s^2/m^2)."""
+    load: Value | None = None
+    """Friction per load, a plain number: it goes as the magnitude of the torque of gravity times the sign of the speed."""
     smoothing: Annotated[Number, Field(ge=0)] = 0.0
     """Coulomb friction goes as tanh(speed / smoothing), rad/s (m/s); zero for the true sign."""
     stribeck_velocity: Annotated[Number, Field(gt=0)] = 0.1
     """Stribeck friction goes as sign(speed) - tanh(speed / stribeck_velocity), rad/s (m/s), with the sign of Coulomb friction."""
     friction: Literal["given", "auto"] = "given"
-    """With auto the log decides: viscous and Coulomb friction and an offset are unknown, smoothing is chosen, and stribeck, asymmetry and quadratic are added where they help."""
+    """With auto the log decides: viscous and Coulomb friction and an offset are unknown, smoothing is chosen, and stribeck, asymmetry, quadratic and load are added where they help."""
 
     @model_validator(mode="after")
     def _check_not_empty(self) -> DriveSection:
@@ -85,6 +87,7 @@ class DriveSection(Section):
             Kind.STRIBECK: bool(np.isfinite(search.stribeck_velocity[k])),
             Kind.ASYMMETRY: bool(search.asymmetry[k]),
             Kind.QUADRATIC: bool(search.quadratic[k]),
+            Kind.LOAD: bool(search.load[k]),
         }
         kinds = [*_USUAL_FRICTION, *(kind for kind, flag in added.items() if flag)]
         update: dict[str, object] = {
@@ -136,10 +139,18 @@ def merge_drives(
 
 
 def find_drive_problems(
-    sections: Mapping[str, DriveSection], coordinates: Sequence[str]
+    sections: Mapping[str, DriveSection], coordinates: Sequence[str], *, closed: bool
 ) -> Iterator[Problem]:
-    """Yield contradictions with the mechanism, by the keys below ``drives``."""
+    """Yield contradictions with the mechanism, by the keys below ``drives``.
+
+    Args:
+        sections: Sections as given.
+        coordinates: Names of the generalised coordinates.
+        closed: Whether the mechanism has loops.
+    """
     for name, section in sections.items():
+        if section.load is not None and closed:
+            yield (name, "load"), "is for open trees only, and this mechanism has loops; remove it"
         if name == ALL and section.motion is not None:
             yield (ALL, "motion"), "is for one drive; give that a name of its own"
         elif name != ALL and section.motion is None and name not in coordinates:

@@ -77,6 +77,23 @@ def test_errors_name_file_line_key_and_remedy(write_config, old, new, line, says
     assert f"{path}, line {line}:" in matching[0]
 
 
+@pytest.mark.parametrize(
+    ("robot", "override", "says"),
+    [
+        ("four_bar", "drives.{}={{load: unknown}}", "is for open trees only"),
+        ("two_link", "drives.z_{}={{load: unknown}}", "no body has a mass"),
+    ],
+)
+def test_friction_per_load_needs_an_open_tree_and_masses(robot, override, says):
+    name = config_of(robot).build_mechanism().coordinate_names[0]
+    massless = ["parameter_sets={none: {}}"] if robot == "two_link" else []
+    lines = errors_of(
+        CONFIGS / f"{robot}.yaml", override.format(name.removeprefix("z_")), *massless
+    )
+    assert f"drives.{name}.load" in lines[0]
+    assert says in " ".join(lines)
+
+
 def test_all_errors_of_a_file_come_at_once(write_config):
     path = write_config(
         ("harmonics: 2", "harmonic: 2"),

@@ -7,6 +7,7 @@ from simulated_logs import FRICTION, TWO_LINK, two_link_log
 from paramreduce_cli.config import load_config
 from paramreduce_cli.config.log_settings import LogSection
 from paramreduce_cli.identification import band_scoring, friction_selection
+from paramreduce_cli.identification.friction_shapes import ShapeSearch, list_candidates
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.records import Kind, RawLog, RawLogs
 from paramreduce_cli.stages.process_log import process_logs_of_robot
@@ -19,13 +20,22 @@ def robot(drives=AUTO):
     return load_config(TWO_LINK, [f"drives={drives}", log, "validation.accept={}"])
 
 
-def searched(friction, drives=AUTO, noise=0.01, seed=0, **keys):
-    """The search on a log whose friction is a function of the speeds, (n_samples, 2)."""
+def gravity_of_two_links(z):
+    """Torques of gravity by hand, (n_samples, 2): masses of 2 kg at 0.25 m and 1 kg at (0.2, 0.01) m, a link of 0.5 m."""
+    angle = z.sum(axis=1)
+    fore = 1.0 * 9.81 * (0.2 * np.cos(angle) - 0.01 * np.sin(angle))
+    return np.column_stack([(2.0 * 0.25 + 1.0 * 0.5) * 9.81 * np.cos(z[:, 0]) + fore, fore])
+
+
+def searched(friction, drives=AUTO, noise=0.01, seed=0, loss=0.0, **keys):
+    """The search on a log whose friction is a function of the speeds, (n_samples, 2), with a loss per load at the first joint."""
     log = two_link_log(seconds=30.0, rate=200.0, noise=0.0)
     dz = np.column_stack([log["dq1"], log["dq2"]])
     viscous, coulomb, offset = np.array(list(FRICTION.values())).T
     tau = np.column_stack([log["tau1"], log["tau2"]])
     tau -= viscous * dz + coulomb * np.sign(dz) + offset
+    load = np.abs(gravity_of_two_links(np.column_stack([log["q1"], log["q2"]]))[:, 0])
+    tau[:, 0] += loss * load * np.sign(dz[:, 0])
     tau += friction(dz) + noise * np.random.default_rng(seed).normal(size=tau.shape)
     log = {"t": log["t"], "q1": log["q1"], "q2": log["q2"], "tau1": tau[:, 0], "tau2": tau[:, 1]}
     section = LogSection(files=["log.csv"], **keys)
@@ -79,6 +89,25 @@ def test_a_term_is_added_where_it_is(term, factor):
     assert changed.automatic_friction == []
 
 
+@pytest.mark.parametrize("given", [{}, {"z_upper": {"load": "unknown"}}])
+def test_friction_that_grows_with_the_load_is_found(given):
+    def friction(dz):
+        return np.sign(dz) * [0.3, 0.5] + [0.8, 0.2] * dz
+
+    drives = {"all": {"friction": "auto"}, **given}
+    config, found = searched(friction, drives, loss=0.1)
+    assert found.friction.load.tolist() == [True, False]
+    mechanism = config.apply_friction(found.friction).build_mechanism()
+    log = found.training
+    W = Dynamics(mechanism).compute_regressor(log.z, log.dz, log.ddz)
+    values = np.linalg.lstsq(W.reshape(-1, W.shape[2]), log.tau.ravel(), rcond=None)[0]
+    assert values[mechanism.parameter_names.index("fl_z_upper")] == pytest.approx(0.1, rel=0.1)
+    states = np.random.default_rng(0).uniform(-2, 2, size=(20, 2))
+    K = Dynamics(mechanism).compute_regressor(states, 0 * states, 0 * states)
+    gravity = gravity_of_two_links(states)
+    assert K @ mechanism.nominal == pytest.approx(gravity, abs=0.05 * np.abs(gravity).max())
+
+
 def test_noise_alone_adds_no_terms():
     def friction(dz):
         return np.tanh(dz / 0.05) * [1.2, 0.5] + [0.8, 0.2] * dz
@@ -87,7 +116,10 @@ def test_noise_alone_adds_no_terms():
     for seed in range(5):
         search = searched(friction, noise=0.3, seed=seed)[1].friction
         added += np.count_nonzero(
-            search.asymmetry | search.quadratic | np.isfinite(search.stribeck_velocity)
+            search.asymmetry
+            | search.quadratic
+            | search.load
+            | np.isfinite(search.stribeck_velocity)
         )
     assert added <= 1
 
@@ -125,7 +157,7 @@ def test_a_joint_may_rest_in_all_folds_but_one(tremble):
     """Its columns are rounding, or hardly more, in the other folds."""
     rng = np.random.default_rng(0)
     drives = robot().build_mechanism().drives
-    candidates = [friction_selection._list_candidates(drive, 1.0) for drive in drives]
+    candidates = [list_candidates(drive, 1.0) for drive in drives]
     folds = []
     for fold in range(5):
         t = 0.01 * np.arange(400) + 4 * fold
@@ -133,12 +165,11 @@ def test_a_joint_may_rest_in_all_folds_but_one(tremble):
         dz = np.column_stack([np.sin(t), rest if fold else np.sin(1.7 * t)])
         others = np.stack([dz, np.gradient(dz, 0.01, axis=0)], axis=2)
         friction = [
-            friction_selection._compute_friction(drive, listed, dz, (0, 1))
+            friction_selection._compute_friction(drive, listed, dz, 0 * dz, (0, 1))
             for drive, listed in zip(drives, candidates, strict=True)
         ]
         tau = others.sum(axis=2) + np.sign(dz) + 0.02 * rng.normal(size=dz.shape)
         folds.append(np.concatenate([others, *friction, tau[..., None]], axis=2))
-    model = friction_selection.FrictionModel(drives, (False, False), (0, 1), None)
     band = band_scoring._factorise(folds)
-    found = friction_selection._Search(band, candidates, model, np.ones(2, bool)).run()
+    found = ShapeSearch(band, candidates, (False, False), np.ones(2, bool)).choose_shape()
     assert found.error < 0.1

@@ -39,15 +39,17 @@ def with_everything(mechanism, seed=0):
     frame[:3, :3] = Rotation.random(random_state=rng).as_matrix()
     frame[:3, 3] = rng.normal(size=3)
     inertial = [kind for kind in Kind if kind not in EVERYTHING]
+    parameters = (
+        *mechanism.parameters,
+        *(Parameter(kind, "load") for kind in inertial),
+        *(Parameter(kind, drive.name) for drive in drives for kind in EVERYTHING),
+    )
     return dataclasses.replace(
         mechanism,
         drives=tuple(drives),
         payloads=(Payload("load", n - 1, frame),),
-        parameters=(
-            *mechanism.parameters,
-            *(Parameter(kind, "load") for kind in inertial),
-            *(Parameter(kind, drive.name) for drive in drives for kind in EVERYTHING),
-        ),
+        parameters=parameters,
+        nominal=rng.uniform(0.5, 2, size=len(parameters)),
     )
 
 
@@ -166,6 +168,22 @@ def test_friction_by_definition():
     first = 2 * dq[:, 0] + 3 * np.sign(dq[:, 0]) + both
     second = 2 * dq[:, 1] + 3 * np.tanh(dq[:, 1] / 0.1) + 0.7 - 2 * both
     assert tau == pytest.approx(np.column_stack([first, second]), abs=1e-12)
+
+
+def test_friction_per_load_by_hand():
+    """A gear of 50 at a level arm of 2 kg m: a tenth of the load, whatever the ratio."""
+    mechanism = mechanism_of(
+        dh([("arm", None, "revolute")]),
+        gravity=[0, -9.81, 0],
+        parameter_sets={"cad": {"arm": {"m": 4, "com": [0.5, 0, 0]}}},
+        drives={"motor": {"motion": {"z_arm": 50.0}, "load": 0.1, "smoothing": 5.0}},
+    )
+    phi = np.zeros(11)
+    phi[-1] = 0.1
+    q, dq = np.array([[0.0], [1.0], [3.0]]), np.array([[0.3], [-0.2], [0.0]])
+    tau = Dynamics(mechanism).compute_torques(q, dq, 0 * q, phi)
+    expected = 0.1 * 2 * 9.81 * np.abs(np.cos(q)) * np.tanh(50 * dq / 5)
+    assert tau == pytest.approx(expected, abs=1e-12)
 
 
 def test_what_a_motor_behind_gears_adds():

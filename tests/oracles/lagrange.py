@@ -23,6 +23,7 @@ class Lagrange:
             pose = poses[rigid.body] @ ca.DM(rigid.frame)
             own_kinetic, own_potential = _energies(pose, q, dq, own, mechanism.gravity)
             kinetic, potential = kinetic + own_kinetic, potential + own_potential
+        potential_of_bodies = potential
         lost = 0
         for drive in mechanism.drives:
             value = {kind: phi[c] for kind, c in mechanism.find_drive_columns(drive).items()}
@@ -37,6 +38,10 @@ class Lagrange:
             friction += value.get(Kind.STRIBECK, 0) * fading
             friction += value.get(Kind.ASYMMETRY, 0) * ca.fabs(speed)
             friction += value.get(Kind.QUADRATIC, 0) * speed * ca.fabs(speed)
+            if Kind.LOAD in value:
+                gravity = ca.substitute(ca.gradient(potential_of_bodies, q), phi, mechanism.nominal)
+                load = ca.dot(drive.weights, gravity) / ca.sumsqr(ca.DM(drive.weights))
+                friction += value[Kind.LOAD] * ca.fabs(load) * slope
             lost += friction * ca.gradient(speed, dq)
         momentum = ca.gradient(kinetic, dq)
         rate = ca.jtimes(momentum, q, dq) + ca.jtimes(momentum, dq, ddq)

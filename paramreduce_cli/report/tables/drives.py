@@ -1,11 +1,11 @@
 """Rotors, friction and springs: along what they act, and their parameters."""
 
-from paramreduce_cli.records import DRIVE, Drive, Kind, Mechanism, Parameter
+from paramreduce_cli.records import DRIVE, WITH_SIGN, Drive, Kind, Mechanism, Parameter
 from paramreduce_cli.report.data import ReportData
 from paramreduce_cli.report.page_sections import PageSection, placed
 from paramreduce_cli.texts.table import Table
 
-_RARE = (Kind.STRIBECK, Kind.ASYMMETRY, Kind.QUADRATIC)
+_RARE = (Kind.STRIBECK, Kind.ASYMMETRY, Kind.QUADRATIC, Kind.LOAD)
 """Friction that has a column only if there is some."""
 
 
@@ -26,7 +26,7 @@ def drives(data: ReportData) -> Table:
             else ""
             for kind in kinds
         ]
-        sign = _sign(drive) if Kind.COULOMB in columns or Kind.STRIBECK in columns else ""
+        sign = _sign(drive) if columns.keys() & set(WITH_SIGN) else ""
         if Kind.STRIBECK in columns:
             sign += f"; Stribeck beyond {drive.stribeck_velocity:g}"
         slack = f"{drive.rest:g}" if Kind.STIFFNESS in columns else ""
