@@ -71,7 +71,12 @@ def record_encoder(log, tau, bits, extra=()):
     """A recording of a simulated log: positions of an encoder, exact ones for no bits, and torques."""
     step = 2 * np.pi / 2**bits if bits else 0.0
     positions = np.round(log.z / step) * step if step else log.z
-    columns = {"t": log.time, **dict(extra)}
+    return make_recording(log.time, positions, tau, extra)
+
+
+def make_recording(time, positions, tau, extra=()):
+    """A recording of some positions and torques."""
+    columns = {"t": time, **dict(extra)}
     for name, values in (("q", positions), ("tau", tau)):
         columns |= {f"{name}{j}": column for j, column in enumerate(values.T, 1)}
     return RawLogs((RawLog("log.csv", columns, 2),), ())

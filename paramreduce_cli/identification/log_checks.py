@@ -25,6 +25,10 @@ _FASTEST = 2.0
 """Hz: motion compared when a recorded speed is held against the positions."""
 _PER_PERIOD = 20
 """Samples of that."""
+_ALIKE = 0.3
+"""Relative difference of the joints' lags from their median, up to which they have one cause."""
+_LEAST_LAG = 0.2
+"""Least lag of speeds that is said, in sampling steps: the one from which a delay of torques spoils intervals."""
 
 
 def find_log_warnings(
@@ -83,22 +87,20 @@ def _find_longest_run(flags: np.ndarray) -> int:
     return int((edges[1::2] - edges[::2]).max(initial=0))
 
 
-def _low_pass(columns: Iterable[FloatArray], rate: float) -> FloatArray:
-    """Return low-passed signals at a lower rate that suffices for them."""
+def _low_pass(columns: Iterable[FloatArray], rate: float, every: int) -> FloatArray:
+    """Return some samples of low-passed signals."""
     taps = filters.design_low_pass(_FASTEST, rate)
-    slow = []
-    for column in columns:
-        every = min(int(rate / (_PER_PERIOD * _FASTEST)), column.size // _PER_PERIOD)
-        slow.append(filters.apply_filter(column[:, None], taps)[:: max(1, every), 0].copy())
-    return np.column_stack(slow)
+    slow = (filters.apply_filter(column[:, None], taps)[::every, 0].copy() for column in columns)
+    return np.column_stack(list(slow))
 
 
 def _compare_speeds(
     z: FloatArray, dz: FloatArray, rate: float, names: Sequence[str]
 ) -> Iterator[str]:
     """Yield warnings about recorded speeds that are not the derivatives of the positions."""
-    slopes = _low_pass((np.gradient(column, 1 / rate) for column in z.T), rate)
-    speeds = _low_pass(dz.T, rate)
+    every = max(1, min(int(rate / (_PER_PERIOD * _FASTEST)), len(z) // _PER_PERIOD))
+    slopes = _low_pass((np.gradient(column, 1 / rate) for column in z.T), rate, every)
+    speeds = _low_pass(dz.T, rate, every)
     messages: dict[str, list[str]] = {}
     for j, name in enumerate(names):
         lengths = np.linalg.norm(speeds[:, j]) * np.linalg.norm(slopes, axis=0)
@@ -127,3 +129,26 @@ def _compare_speeds(
             ).append(name)
     for what, joints in messages.items():
         yield f"the speed of {_join_names(joints)} {what}"
+    if not messages:
+        yield from _find_lag(slopes, speeds, rate, every)
+
+
+def _find_lag(slopes: FloatArray, speeds: FloatArray, rate: float, every: int) -> Iterator[str]:
+    """Yield a warning if recorded speeds come later than the slopes of the positions, as those of a filter do.
+
+    Args:
+        slopes: Slopes of the positions, (n_samples, n_dof).
+        speeds: Recorded speeds, (n_samples, n_dof).
+        rate: Samples per second as recorded.
+        every: Recorded samples from one of these to the next.
+    """
+    rates = np.gradient(slopes, every / rate, axis=0)
+    powers = np.sum(rates**2, axis=0)
+    moving = powers > 0
+    lags = np.sum((slopes - speeds) * rates, axis=0)[moving] / powers[moving]
+    lag = float(np.median(lags)) if lags.size else 0.0
+    if lag * rate > _LEAST_LAG and np.all(np.abs(lags - lag) < _ALIKE * lag):
+        yield (
+            f"recorded speeds come {1e3 * lag:.2g} ms after the slopes of the positions, as a low-pass of the controller makes them; "
+            "if it does not delay torques too, leave out sampling.log.columns.velocity: speeds are then made of positions."
+        )

@@ -24,8 +24,15 @@ from paramreduce_cli.reduction.criteria.torque import TorqueObjective
 from paramreduce_cli.reduction.fitting import fit
 from paramreduce_cli.reduction.problem import SelectionProblem
 from paramreduce_cli.reduction.task import Effort, SelectionTask, run
-from tests.benchmarks.estimators import collect, factorise, fit_by_noise, print_estimators, process
-from tests.simulated_logs import RATE, along_axes, arm, coloured, simulated
+from tests.benchmarks.estimators import (
+    BaseModel,
+    collect,
+    factorise,
+    fit_by_noise,
+    print_estimators,
+    process,
+)
+from tests.simulated_logs import RATE, along_axes, arm, coloured, record_encoder, simulated
 
 _NOISE = 0.03
 """Standard deviation of the noise, a share of each joint's torques."""
@@ -77,7 +84,9 @@ def fit_exact_states(log, tau):
 
 def fit_recorded_positions(log, tau):
     """Fit to the first 12 s, states and cut-offs by the tool from positions of an encoder."""
-    return fit_by_noise(collect(process(log, tau, _BITS)))
+    _, dynamics, base, _ = arm()
+    model = BaseModel(dynamics, base.columns)
+    return fit_by_noise(collect(model, process(model, record_encoder(log, tau, _BITS))))
 
 
 def coverage(fit_log, pole, count):
