@@ -7,6 +7,10 @@ import numpy as np
 
 from paramreduce_cli.identification.estimation import LinearFit
 from paramreduce_cli.identification.joint_hypotheses import hint_at_joint_frames
+from paramreduce_cli.identification.prediction_uncertainty import (
+    compute_uncertainty,
+    hint_at_motion,
+)
 from paramreduce_cli.identification.residual_hints import (
     find_residual_hints,
     hint_at_negative_friction,
@@ -90,8 +94,10 @@ def find_hints(
     )
     if wrong:  # what else is seen follows from that
         return [*_hint_at_large_errors(full), *wrong]
+    uncertainty = compute_uncertainty(looked_at.dynamics, model.base.columns, fitted)
     return [
         *_hint_at_large_errors(full),
+        *hint_at_motion(*uncertainty, fitted, names),
         *_hint_at_bodies(model, looked_at, full),
         *find_residual_hints(
             fitted,
