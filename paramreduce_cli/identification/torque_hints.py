@@ -25,21 +25,20 @@ _NEAR = 0.1
 """Share of gravity by which its direction may be off an axis of the base."""
 
 
-def hint_at_unit(expected: FloatArray, ratios: FloatArray) -> list[str]:
+def hint_at_unit(expected: FloatArray, identified: FloatArray) -> list[str]:
     """Return a hint if measured torques are the config's torques times a large, small or negative factor, as with a
     wrong unit or sign.
 
     Args:
         expected: Torques of the bodies with the values in the config, (n_samples, n_dof).
-        ratios: Torques of the bodies with the identified values, (n_samples, n_dof).
+        identified: Torques of the bodies with the identified values, (n_samples, n_dof).
     """
-    sizes = np.sqrt(np.mean(ratios**2, axis=0))
-    scaled = [torques / np.where(sizes > 0, sizes, np.inf) for torques in (expected, ratios)]
-    product = float(np.sum(scaled[0] * scaled[1]))
-    lengths = [float(np.linalg.norm(torques)) for torques in scaled]
-    if not abs(product) > _ALIKE * lengths[0] * lengths[1] > 0:
+    # The largest torques decide: those of small joints are often noise, and their values in robots' files guesses.
+    product = float(np.sum(expected * identified))
+    length = float(np.linalg.norm(expected))
+    if not abs(product) > _ALIKE * length * float(np.linalg.norm(identified)) > 0:
         return []
-    factor = product / lengths[0] ** 2
+    factor = product / length**2
     if factor < 0:
         return [
             "Bodies weigh the opposite of what the parameters in the config let expect: does gravity point the "
