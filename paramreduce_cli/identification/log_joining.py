@@ -6,10 +6,12 @@ import numpy as np
 import scipy  # its interpolate takes a quarter of a second to load, so only when it is used
 
 from paramreduce_cli.errors import DataError
-from paramreduce_cli.records import FloatArray, RawLog
+from paramreduce_cli.records import BoolArray, FloatArray, RawLog
 
 _LEAST_COMMON = 0.5
 """Share of the shortest part's duration in which all parts have to be recorded."""
+_FASTER = 1.5
+"""Times as many samples a second from which on a column is averaged."""
 GAP = 5.5
 """Usual time steps that make a gap."""
 
@@ -17,7 +19,7 @@ GAP = 5.5
 def join_logs(parts: Sequence[RawLog], time: str) -> RawLog:
     """Return the columns of all parts at the times of the part with the most rows a second.
 
-    Columns of the other parts are interpolated by cubic splines; times at which a part is not recorded are left out.
+    Columns of the other parts are interpolated by cubic splines; times at which a part is not recorded, or has a gap, are left out.
 
     Args:
         parts: Parts of one recording, at least one.
@@ -38,7 +40,7 @@ def join_logs(parts: Sequence[RawLog], time: str) -> RawLog:
         )
         raise DataError(f"parts of one recording have hardly any time in common: {spans}.")
     fastest = max(range(len(parts)), key=lambda k: times[k].size / (times[k][-1] - times[k][0]))
-    kept = (times[fastest] >= first) & (times[fastest] <= last)
+    kept = ~np.any([_find_missing(own, times[fastest]) for own in times], axis=0)
     at = times[fastest][kept]
     columns: dict[str, FloatArray] = {time: at}
     for k, (part, own) in enumerate(zip(parts, times, strict=True)):
@@ -58,7 +60,8 @@ def join_logs(parts: Sequence[RawLog], time: str) -> RawLog:
 def align_column(log: RawLog, name: str, time: str) -> FloatArray:
     """Return a column at the times of a recording: interpolated if it belongs to a topic with times of its own.
 
-    Outside its own times and in their gaps the column is not a number.
+    A column that is recorded more often is averaged over the time steps of the recording, so that what is too fast for these is not
+    folded down. Outside its own times and in their gaps the column is not a number.
 
     Args:
         log: Log with several topics or groups.
@@ -69,13 +72,15 @@ def align_column(log: RawLog, name: str, time: str) -> FloatArray:
     if own is None or own == time or np.array_equal(log.columns[own], log.columns[time]):
         return values
     recorded_at, at = log.columns[own], log.columns[time]
-    steps = np.diff(recorded_at)
-    if not np.all(steps > 0):
+    steps, wanted = np.diff(recorded_at), np.diff(at)
+    if not np.all(steps > 0) or not np.all(wanted > 0):
         return values
-    aligned = _interpolate(recorded_at, values, at)
-    following = np.clip(np.searchsorted(recorded_at, at), 1, steps.size)
-    outside = (at < recorded_at[0]) | (at > recorded_at[-1])
-    aligned[outside | (steps[following - 1] > GAP * np.median(steps))] = np.nan
+    step = float(np.median(wanted))
+    if step > _FASTER * np.median(steps):
+        aligned = _average(recorded_at, values, at, step)
+    else:
+        aligned = _interpolate(recorded_at, values, at)
+    aligned[_find_missing(recorded_at, at)] = np.nan
     return aligned
 
 
@@ -111,12 +116,45 @@ def _get_times(part: RawLog, time: str) -> FloatArray:
     return times
 
 
+def _find_missing(recorded_at: FloatArray, at: FloatArray) -> BoolArray:
+    """Return whether times are outside those of a part, or in a gap of it."""
+    steps = np.diff(recorded_at)
+    following = np.clip(np.searchsorted(recorded_at, at), 1, steps.size)
+    missing: BoolArray = (at < recorded_at[0]) | (at > recorded_at[-1])
+    return missing | (steps[following - 1] > GAP * np.median(steps))
+
+
+def _average(
+    recorded_at: FloatArray, values: FloatArray, at: FloatArray, step: float
+) -> FloatArray:
+    """Return a column at other times, averaged over a time step around each; beside values that are not finite the result is not a
+    number.
+    """
+    finite = np.isfinite(values)
+    if np.count_nonzero(finite) < 2:
+        return np.full(at.size, np.nan)
+    spline = scipy.interpolate.CubicSpline(recorded_at[finite], values[finite])
+    sums = spline.antiderivative()
+    # Windows are as long on both sides, also near the ends.
+    half = np.clip(np.minimum(at - recorded_at[0], recorded_at[-1] - at), 0.0, step / 2)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        means = (sums(at + half) - sums(at - half)) / (2 * half)
+    result = np.where(half > 1e-3 * step, means, spline(at))
+    return _hide_missing(result, recorded_at, finite, at)
+
+
 def _interpolate(recorded_at: FloatArray, values: FloatArray, at: FloatArray) -> FloatArray:
     """Return a column at other times; beside values that are not finite the result is not a number."""
     finite = np.isfinite(values)
     if np.count_nonzero(finite) < 2:
         return np.full(at.size, np.nan)
     result: FloatArray = scipy.interpolate.CubicSpline(recorded_at[finite], values[finite])(at)
+    return _hide_missing(result, recorded_at, finite, at)
+
+
+def _hide_missing(
+    result: FloatArray, recorded_at: FloatArray, finite: BoolArray, at: FloatArray
+) -> FloatArray:
+    """Return a column that is not a number beside recorded values that are not finite."""
     near = np.interp(at, recorded_at, np.where(finite, 0.0, 1.0))
-    result[near > 0] = np.nan
-    return result
+    return np.where(near > 0, np.nan, result)

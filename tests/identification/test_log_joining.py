@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from paramreduce_cli.errors import DataError
-from paramreduce_cli.identification.log_joining import join_logs
+from paramreduce_cli.identification.log_joining import align_column, join_logs
 from paramreduce_cli.records import RawLog
 
 
@@ -37,6 +37,26 @@ def test_what_is_missing_is_missing_between_its_neighbours_too():
     missing = np.isnan(joined.columns["tau1"])
     t = joined.columns["t"]
     np.testing.assert_array_equal(missing, np.abs(t - 2.0) < 1 / 50 - 1e-9)
+
+
+def test_gaps_of_a_slower_part_are_gaps():
+    slow = part("a.csv", 50, tau1=np.sin)
+    kept = (slow.columns["t"] < 1) | (slow.columns["t"] > 2)
+    slow = RawLog("a.csv", {name: values[kept] for name, values in slow.columns.items()}, 2)
+    t = join_logs([slow, part("b.csv", 200, q1=np.sin)], "t").columns["t"]
+    assert np.max(np.diff(t)) == pytest.approx(1.0, abs=0.05)
+
+
+def test_a_topic_of_a_higher_rate_is_averaged():
+    """Noise at 101 Hz would be one of 1 Hz at 100 samples a second."""
+    t, often = np.arange(0, 4, 0.01), np.arange(0, 4, 0.001)
+    columns = {"/a/time": t, "/a/q1": np.sin(t), "/b/time": often}
+    for name, signal in (("slow", np.sin(often)), ("fast", np.sin(2 * np.pi * 101 * often))):
+        log = RawLog("bag", columns | {"/b/tau1": signal}, None)
+        found = align_column(log, "/b/tau1", "/a/time")
+        inner = slice(1, -2)
+        expected = np.sin(t) if name == "slow" else 0 * t
+        np.testing.assert_allclose(found[inner], expected[inner], atol=0.02)
 
 
 @pytest.mark.parametrize(
