@@ -15,7 +15,7 @@ from paramreduce_cli.errors import Key
 from paramreduce_cli.fields.names import Problem, UnknownNameError
 from paramreduce_cli.fields.numbers import RATHER_DEGREES
 from paramreduce_cli.fields.section import expand_per_joint
-from paramreduce_cli.records import WITH_SIGN, Parameter
+from paramreduce_cli.records import SIGN_FRICTION, Parameter
 from paramreduce_cli.robots import drives, payloads
 from paramreduce_cli.robots.inertia import compute_pseudo_inertia, is_positive_semidefinite
 
@@ -84,10 +84,23 @@ def _check_payloads_and_drives(config: Config) -> Iterator[Problem]:
                 ("drives", name, "friction"),
                 "is auto, but there is no sampling.log to decide; give values or unknown",
             )
-        if drive.load is not None and drive.friction != "auto" and not config.has_masses():
+
+
+def _check_loads(config: Config) -> Iterator[Problem]:
+    """Yield problems of friction that depends on the load, if the log does not tell the masses."""
+    if config.automatic_friction or config.parameters not in (None, *config.parameter_sets):
+        return
+    massless = not config.has_masses()
+    for name, drive in config.drives.items():
+        if drive.load is not None and massless:
             yield (
                 ("drives", name, "load"),
                 "needs the torques of gravity, and no body has a mass; give values of the bodies, or friction: auto",
+            )
+        elif drive.load is not None and config.identification.payloads:
+            yield (
+                ("drives", name, "load"),
+                "leaves out the weight of the payloads that identification.payloads asks for; give friction: auto, or remove it",
             )
 
 
@@ -201,7 +214,7 @@ def _check_simulation(config: Config) -> Iterator[Problem]:
     if section.duration / section.step > _MOST_STEPS:
         yield (*path, "step"), f"makes more than {_MOST_STEPS} samples of {section.duration:g} s"
     for name, drive in config.list_drives().items():
-        if set(WITH_SIGN) & set(drive.get_values()) and not drive.smoothing:
+        if set(SIGN_FRICTION) & set(drive.get_values()) and not drive.smoothing:
             yield ("drives",), f"{name} needs a smoothing: a sign that jumps cannot be simulated"
     sampling = config.sampling
     if any(sampling.list_recordings().values()) or sampling.symmetries:
@@ -366,6 +379,7 @@ _CHECKS: tuple[Check, ...] = (
     _check_simulation,
     _check_inertia,
     _check_parameter_sets,
+    _check_loads,
     _check_per_joint,
     _check_limits,
     _check_acceptance,

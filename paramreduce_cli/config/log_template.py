@@ -10,7 +10,7 @@ from paramreduce_cli.config.log_settings import TODO
 LOG_DRIVES = """\
 drives:
   # Friction and rotors, whose values the log tells: a number, or unknown if yet to be found. `friction: auto` makes viscous
-  # and Coulomb friction and an offset unknown, and chooses their shape by cross-validation. Leave out what your sensors do
+  # and Coulomb friction and an offset unknown, and chooses their shape. Leave out what your sensors do
   # not see: torque sensors behind the gears see no rotors.
   all: {inertia: unknown, friction: auto}
 """

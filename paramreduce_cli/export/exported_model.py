@@ -152,7 +152,9 @@ def write_header(model: ExportedModel, first: int = 0) -> list[str]:
     ]
     for k, p in enumerate(model.parameters, first):
         made_of = f", {make_harmless(p.expression)}" if p.expression else ""
-        lines.append(f"  {k}: {make_harmless(p.name)} = {p.value:.9g} {p.unit}{made_of}")
+        lines.append(
+            f"  {k}: {make_harmless(p.name)} = {p.value:.9g}{f' {p.unit}' if p.unit else ''}{made_of}"
+        )
     return [part for line in lines for part in wrap_line(line)]
 
 

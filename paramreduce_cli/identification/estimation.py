@@ -32,6 +32,8 @@ _TUNING = 1.345
 _MOST_ROUNDS = 30
 _SETTLED = 1e-6
 _CONFIDENCE = 0.95
+_UNDETERMINED = 1e-9
+"""Singular value, relative to the largest of columns of unit length, from which on rows determine a direction."""
 _LAGS = 10
 """Lags of the test of whiteness."""
 
@@ -153,13 +155,28 @@ class LinearFit:
         return 1 / self.deviation**2
 
     @cached_property
-    def _inverse(self) -> FloatArray:
-        """Inverse of X' W X over the rows."""
+    def _inverse_factors(self) -> tuple[FloatArray, FloatArray]:
+        """Factors of the inverse of X' W X over the rows, with a large entry for each direction that no row determines.
+
+        Returns:
+            The factors of determined and of undetermined directions, (p, n) each.
+        """
         scaled = [X / self.deviation[:, None] for X in self.rows.X]
         stacked = np.concatenate([X.reshape(-1, X.shape[2]) for X in scaled])
         R = np.linalg.qr(stacked, mode="r")
-        inverse = np.linalg.pinv(R)
-        result: FloatArray = inverse @ inverse.T
+        lengths = np.linalg.norm(R, axis=0)
+        lengths = np.where(lengths > 0, lengths, lengths.max(initial=1e-300))
+        _, sizes, directions = np.linalg.svd(R / lengths)
+        sizes = np.pad(sizes, (0, lengths.size - sizes.size))
+        least = _UNDETERMINED * sizes[0]
+        factors = directions.T / lengths[:, None] / np.maximum(sizes, least)
+        return factors[:, sizes > least], factors[:, sizes <= least]
+
+    @cached_property
+    def _inverse(self) -> FloatArray:
+        """Inverse of X' W X over the rows, in the directions that these determine."""
+        determined, _ = self._inverse_factors
+        result: FloatArray = determined @ determined.T
         return result
 
     @cached_property
@@ -201,7 +218,14 @@ class LinearFit:
 
     def compute_covariance(self) -> FloatArray:
         """Return the covariance of the parameters, (p, p)."""
-        return self._propagate_noise(self.noise) * self.rows.fraction
+        return self._covariance
+
+    @cached_property
+    def _covariance(self) -> FloatArray:
+        """Covariance of the parameters, (p, p)."""
+        _, undetermined = self._inverse_factors
+        determined = self._propagate_noise(self.noise) * self.rows.fraction
+        return determined + undetermined @ undetermined.T
 
     def compute_half_widths(self) -> FloatArray:
         """Return the half widths of the intervals that hold the true parameters in 95 of 100 cases, (p,).

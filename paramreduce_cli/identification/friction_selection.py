@@ -1,13 +1,13 @@
-"""The shape of friction, chosen by cross-validation within the training part.
+"""The shape of friction, chosen within the training part.
 
 Friction is linear in its parameters but for a few shape parameters: the speed at which Coulomb friction is smoothed, and
 the speed beyond which Stribeck friction fades. Given these, all parameters follow from linear least squares (separable
-least squares [Golub2003]). Friction that grows with the load comes last, as its load is the torque of gravity of the
-parameters that were fitted before.
+least squares [Golub2003]). Load-dependent friction comes last, because its load is the gravity torque of the parameters that were fitted before; for it the
+columns are computed again.
 """
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -32,6 +32,7 @@ from paramreduce_cli.identification.state_estimation import (
     compute_edge,
     estimate_states,
 )
+from paramreduce_cli.multibody.drive_dynamics import OddFunctions, express_unit_force
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.records import (
     INERTIAL,
@@ -44,6 +45,7 @@ from paramreduce_cli.records import (
     Kind,
 )
 
+_NUMPY = OddFunctions(np.sign, np.tanh)
 _FRICTION = (Kind.COULOMB, Kind.STRIBECK, Kind.ASYMMETRY, Kind.QUADRATIC, Kind.LOAD)
 _PER_BAND = 6
 """Highest frequency of the torques before the low-pass, over that of the scored band."""
@@ -142,8 +144,10 @@ def select_friction(
         n_folds: Number of folds.
 
     Returns:
-        The choice, or None if the log is too short for one.
+        The choice, or None if there are no drives, or if the log is too short.
     """
+    if not model.drives:
+        return None
     fastest = _find_largest_speeds(pieces, rate, cutoffs.state, model)
     candidates = [
         list_candidates(drive, speed) for drive, speed in zip(model.drives, fastest, strict=True)
@@ -152,7 +156,7 @@ def select_friction(
     def select(
         candidates: Sequence[Sequence[Candidate]], parameters: FloatArray | None = None
     ) -> ShapeSearch | None:
-        """Return the search among some columns; the load is that of some parameters."""
+        """Return the search among the candidates, or None if the log is too short; the parameters give the load."""
         band = _compute_band(pieces, rate, cutoffs, model, candidates, parameters, n_folds)
         return None if band is None else ShapeSearch(band, candidates, model.fixed, measured)
 
@@ -262,15 +266,13 @@ def _compute_friction(
         gravity: Torques of gravity, (n_samples, n_dof).
         independent: Indices of the independent coordinates among the generalised ones, (n_dof,).
     """
-    weights = drive.weights[list(independent)]
-    speed, load = dz @ weights, gravity @ weights / (weights @ weights)
-    columns = []
-    for candidate in candidates:
-        if candidate.kind is Kind.ASYMMETRY:
-            columns.append(np.abs(speed))
-        elif candidate.kind is Kind.QUADRATIC:
-            columns.append(speed * np.abs(speed))
-        else:
-            sign = np.tanh(speed / candidate.speed) if candidate.speed > 0 else np.sign(speed)
-            columns.append(np.abs(load) * sign if candidate.kind is Kind.LOAD else sign)
-    return np.stack(columns, axis=1)[:, None, :] * weights[:, None]
+    rest = np.zeros(len(dz))
+    speeds, loads = [rest] * drive.weights.size, [rest] * drive.weights.size
+    for j, k in enumerate(independent):
+        speeds[k], loads[k] = dz[:, j], gravity[:, j]
+    states: tuple[list[FloatArray], ...] = ([], speeds, [], loads)
+    columns = [
+        express_unit_force(c.kind, replace(drive, smoothing=c.speed), states, _NUMPY)
+        for c in candidates
+    ]
+    return np.stack(columns, axis=1)[:, None, :] * drive.weights[list(independent)][:, None]

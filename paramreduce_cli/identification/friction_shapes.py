@@ -1,8 +1,8 @@
 """A search for the shape of friction: smoothings that leave the smallest residual, and terms that predict left-out folds.
 
-The columns of all candidate shapes are computed once, so that each candidate costs one small fit. Every drive has a smoothing, one
-number more, and the residual of all training data tells it best: cross-validation left parameters that are 36 % worse than with the
-true smoothing, the residual 12 % (24 simulated logs of three arms). Terms are more or fewer parameters, so these are cross-validated.
+The columns of all candidate shapes are factorised once, so that each candidate costs one small fit. Each drive has one smoothing, and the
+residual of all training data determines it better than cross-validation does (docs/lab/logs.md). Terms add parameters, so they are
+cross-validated.
 """
 
 from collections.abc import Sequence
@@ -70,7 +70,7 @@ class SelectedShapes:
         columns: Columns of each drive: the sign, then further terms.
         parameters: Parameters of all other columns, fitted with these to all folds, (n_rest,).
         error: Relative error of torques on left-out folds.
-        usual_error: The same with what the search began with.
+        usual_error: Relative error of torques on left-out folds with the friction that the search began with.
     """
 
     columns: tuple[tuple[Candidate, ...], ...]
@@ -266,7 +266,7 @@ def _solve_normal_equations(G: FloatArray, least: FloatArray | float = 0.0) -> F
 
     Args:
         G: Products of the columns and the torques with each other, (n + 1, n + 1).
-        least: Least square of the length of each column: one that is zero, or rounding, has a parameter of about zero then.
+        least: Smallest squared length of each column that is not taken for rounding; the parameters of shorter columns stay near zero.
     """
     lengths = np.sqrt(np.maximum(np.diag(G)[:-1], least + 1e-300))
     A = G[:-1, :-1] / np.outer(lengths, lengths)

@@ -8,8 +8,8 @@ import numpy as np
 from paramreduce_cli.identification.estimation import LinearFit
 from paramreduce_cli.identification.joint_hypotheses import hint_at_joint_frames
 from paramreduce_cli.identification.prediction_uncertainty import (
-    compute_uncertainty,
-    hint_at_motion,
+    compute_torque_uncertainty,
+    hint_at_undetermined_torques,
 )
 from paramreduce_cli.identification.residual_hints import (
     find_residual_hints,
@@ -25,6 +25,7 @@ from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.records import (
     DRIVE,
     INERTIAL,
+    BoolArray,
     Consistency,
     Estimate,
     FloatArray,
@@ -94,11 +95,11 @@ def find_hints(
     )
     if wrong:  # what else is seen follows from that
         return [*_hint_at_large_errors(full), *wrong]
-    uncertainty = compute_uncertainty(looked_at.dynamics, model.base.columns, fitted)
+    uncertainty = compute_torque_uncertainty(looked_at.dynamics, model.base.columns, fitted)
     return [
         *_hint_at_large_errors(full),
-        *hint_at_motion(*uncertainty, fitted, names),
-        *_hint_at_bodies(model, looked_at, full),
+        *hint_at_undetermined_torques(*uncertainty, np.isfinite(fitted.deviation), names),
+        *_hint_at_bodies(model, looked_at, full, np.isfinite(fitted.deviation)),
         *find_residual_hints(
             fitted,
             names,
@@ -209,10 +210,12 @@ def _sample_states(model: Model, training: SampleSet) -> _SampledStates:
     )
 
 
-def _hint_at_bodies(model: Model, sampled: _SampledStates, full: Estimate) -> list[str]:
+def _hint_at_bodies(
+    model: Model, sampled: _SampledStates, full: Estimate, measured: BoolArray
+) -> list[str]:
     """Return hints that compare torques with the config's values of bodies and ratings of joints."""
     bodies = [k for k, p in enumerate(model.mechanism.parameters) if p.kind in INERTIAL]
-    W = sampled.W[:, :, bodies]
+    W = sampled.W[:, measured][:, :, bodies]
     found = hint_at_unit(W @ model.values[bodies], W @ full.standard[bodies])
     if found or not model.nominal_torque_given:
         return found

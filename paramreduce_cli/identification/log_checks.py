@@ -25,10 +25,14 @@ _FASTEST = 2.0
 """Hz: motion compared when a recorded speed is held against the positions."""
 _PER_PERIOD = 20
 """Samples of that."""
-_ALIKE = 0.3
+_SAME_LAG = 0.3
 """Relative difference of the joints' lags from their median, up to which they have one cause."""
 _LEAST_LAG = 0.2
-"""Least lag of speeds that is said, in sampling steps: the one from which a delay of torques spoils intervals."""
+"""Lag of speeds, in sampling steps, from which there is a warning; a delay of the torques by as much moves parameters out of their intervals."""
+_LAG_ALONE = 0.7
+"""Correlation of accelerations with the difference of speeds and slopes, from which a lag explains that difference."""
+_RESTS = 1e-3
+"""Power of a joint's acceleration, relative to the largest, up to which the joint rests."""
 
 
 def find_log_warnings(
@@ -88,7 +92,7 @@ def _find_longest_run(flags: np.ndarray) -> int:
 
 
 def _low_pass(columns: Iterable[FloatArray], rate: float, every: int) -> FloatArray:
-    """Return some samples of low-passed signals."""
+    """Return one of ``every`` samples of low-passed signals, (n_samples, n_columns)."""
     taps = filters.design_low_pass(_FASTEST, rate)
     slow = (filters.apply_filter(column[:, None], taps)[::every, 0].copy() for column in columns)
     return np.column_stack(list(slow))
@@ -134,7 +138,7 @@ def _compare_speeds(
 
 
 def _find_lag(slopes: FloatArray, speeds: FloatArray, rate: float, every: int) -> Iterator[str]:
-    """Yield a warning if recorded speeds come later than the slopes of the positions, as those of a filter do.
+    """Yield a warning if recorded speeds lag the slopes of the positions, as those of a filter do.
 
     Args:
         slopes: Slopes of the positions, (n_samples, n_dof).
@@ -142,13 +146,22 @@ def _find_lag(slopes: FloatArray, speeds: FloatArray, rate: float, every: int) -
         rate: Samples per second as recorded.
         every: Recorded samples from one of these to the next.
     """
-    rates = np.gradient(slopes, every / rate, axis=0)
-    powers = np.sum(rates**2, axis=0)
-    moving = powers > 0
-    lags = np.sum((slopes - speeds) * rates, axis=0)[moving] / powers[moving]
-    lag = float(np.median(lags)) if lags.size else 0.0
-    if lag * rate > _LEAST_LAG and np.all(np.abs(lags - lag) < _ALIKE * lag):
+    changes, left = np.gradient(slopes, every / rate, axis=0), slopes - speeds
+    powers, products = np.sum(changes**2, axis=0), np.sum(left * changes, axis=0)
+    moving = powers > _RESTS * powers.max(initial=0.0)
+    if not moving.any():
+        return
+    lags = products[moving] / powers[moving]
+    alike = products[moving].sum() / max(
+        1e-300, float(np.linalg.norm(left[:, moving]) * np.linalg.norm(changes[:, moving]))
+    )
+    lag = float(np.median(lags))
+    if (
+        lag * rate > _LEAST_LAG
+        and alike > _LAG_ALONE
+        and np.all(np.abs(lags - lag) < _SAME_LAG * lag)
+    ):
         yield (
-            f"recorded speeds come {1e3 * lag:.2g} ms after the slopes of the positions, as a low-pass of the controller makes them; "
-            "if it does not delay torques too, leave out sampling.log.columns.velocity: speeds are then made of positions."
+            f"recorded speeds lag the positions by about {1e3 * lag:.1g} ms, probably because of a filter or of backward differences in "
+            "the controller. If torques do not lag as much, remove sampling.log.columns.velocity; speeds are then differentiated from positions."
         )

@@ -10,7 +10,7 @@ import numpy as np
 from paramreduce_cli.identification.estimation import LinearFit
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.multibody.random_states import draw_states
-from paramreduce_cli.records import FloatArray, IntArray
+from paramreduce_cli.records import BoolArray, FloatArray, IntArray
 from paramreduce_cli.texts import format_percent
 
 _STATES = 200
@@ -18,13 +18,15 @@ _UNCERTAIN = 0.2
 """Uncertainty of the torques of all joints together from which a hint is given; usual logs leave 0.01 to 0.06."""
 _UNKNOWN = 1.0
 """Uncertainty of the torques of a joint from which it is named; usual logs leave up to 0.4."""
+_LEAST_SIZE = 1e-3
+"""Size of a joint's torques, relative to the largest, from which its uncertainty counts."""
 _MOST_NAMED = 3
 
 
-def compute_uncertainty(
+def compute_torque_uncertainty(
     dynamics: Dynamics, columns: IntArray, fit: LinearFit
 ) -> tuple[FloatArray, FloatArray]:
-    """Return the uncertainty of torques on random states, with speeds and accelerations of about one.
+    """Return the uncertainty of predicted torques on random states, with speeds and accelerations of about one.
 
     Args:
         dynamics: Dynamics of the robot.
@@ -41,27 +43,27 @@ def compute_uncertainty(
     return np.sqrt(np.maximum(variance, 0.0)), sizes
 
 
-def hint_at_motion(
-    deviations: FloatArray, sizes: FloatArray, fit: LinearFit, names: Sequence[str]
+def hint_at_undetermined_torques(
+    deviations: FloatArray, sizes: FloatArray, measured: BoolArray, names: Sequence[str]
 ) -> Iterator[str]:
-    """Yield a hint if the recorded motion does not tell the torques of other motions.
+    """Yield a hint if the recorded motion does not determine the torques of other motions.
 
     Args:
         deviations: Standard deviations of torques on random states, (n_dof,).
         sizes: Sizes of these torques, (n_dof,).
-        fit: Fit of all base parameters.
+        measured: Whether the torques of each joint are measured, (n_dof,).
         names: Names of the independent coordinates.
     """
-    measured = np.isfinite(fit.deviation)
-    size = max(float(np.linalg.norm(sizes[measured])), 1e-300)
-    whole = float(np.linalg.norm(deviations[measured])) / size
-    shares = np.where(measured, deviations / np.maximum(sizes, 1e-300), 0.0)
-    worst = [int(j) for j in np.argsort(-shares)[:_MOST_NAMED] if shares[j] > _UNKNOWN]
-    if whole <= _UNCERTAIN and not worst:
+    largest = sizes[measured].max(initial=0.0)
+    if not largest > 0:
         return
-    named = ", ".join(names[j] for j in worst)
-    yield (
-        f"Trust torques of all base parameters on motions like the recorded one only: on random motions of all joints the noise leaves "
-        f"them uncertain by {format_percent(whole)}{f', most at {named}' if worst else ''}. Record a motion in which all "
-        "joints move, fast and not in unison."
-    )
+    whole = float(np.linalg.norm(deviations[measured]) / np.linalg.norm(sizes[measured]))
+    ratios = np.where(measured, deviations / np.maximum(sizes, _LEAST_SIZE * largest), 0.0)
+    worst = [int(j) for j in np.argsort(-ratios)[:_MOST_NAMED] if ratios[j] > _UNKNOWN]
+    if worst or whole > _UNCERTAIN:
+        listed = ", ".join(f"{names[j]} {format_percent(float(ratios[j]))}" for j in worst)
+        yield (
+            "The recorded motion does not determine the torques of other motions. On random motions of all joints their standard "
+            f"deviation is {format_percent(whole)}{f' ({listed})' if worst else ''}. Record a motion in which all joints move, fast and "
+            "not in unison."
+        )

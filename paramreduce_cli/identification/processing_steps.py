@@ -45,8 +45,9 @@ def describe_friction(search: FrictionSearch | None) -> Iterator[str]:
         f"{name} {speed:.3g}" for name, speed in zip(search.drives, search.smoothing, strict=True)
     )
     yield (
-        f"Friction: Coulomb friction is smoothed below the speeds {listed} (0: not smoothed). Left-out torques are missed by "
-        f"{format_percent(search.error)}, with the smoothing to begin with by {format_percent(search.usual_error)}."
+        f"Friction: Coulomb friction is smoothed below the speeds {listed} (0: not smoothed), which leaves the smallest residual. "
+        f"Left-out torques are missed by {format_percent(search.error)}, with the smoothing to begin with by "
+        f"{format_percent(search.usual_error)}."
     )
     terms = [
         ("Stribeck", np.isfinite(search.stribeck_velocity)),

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import casadi as ca
 import numpy as np
 
-from paramreduce_cli.records import WITH_SIGN, Drive, FloatArray, Kind, Mechanism
+from paramreduce_cli.records import SIGN_FRICTION, Drive, FloatArray, Kind, Mechanism
 
 
 class OddFunctions(NamedTuple):
@@ -85,7 +85,7 @@ def smooth_friction(mechanism: Mechanism, speeds: FloatArray) -> Mechanism:
         mechanism: The mechanism.
         speeds: Largest speeds of the independent coordinates, (n_dof,), rad/s or m/s.
     """
-    if all(parameter.kind not in WITH_SIGN for parameter in mechanism.parameters):
+    if all(parameter.kind not in SIGN_FRICTION for parameter in mechanism.parameters):
         return mechanism
     fastest = np.full(mechanism.n_q, speeds.max())
     fastest[list(mechanism.independent)] = speeds

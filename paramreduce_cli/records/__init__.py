@@ -55,7 +55,7 @@ from paramreduce_cli.records.parameters import (
     DRIVE,
     INERTIAL,
     LAST,
-    WITH_SIGN,
+    SIGN_FRICTION,
     Kind,
     Parameter,
     order_by_preference,

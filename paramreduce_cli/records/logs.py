@@ -137,7 +137,7 @@ class CutoffSearch:
 
 @record
 class FrictionSearch:
-    """The shape of the friction of drives, chosen by cross-validation."""
+    """The shape of the friction of drives, chosen within the training part."""
 
     drives: tuple[str, ...]
     """Names of the drives, (n_drives,)."""

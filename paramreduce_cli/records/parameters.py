@@ -38,7 +38,7 @@ class Kind(Enum):
     STRIBECK = ("fs", "N m", 15, "f", "s", "stribeck", "N", None)
     ASYMMETRY = ("fa", "N m s/rad", 16, "f", "a", "asymmetry", "N s/m", None)
     QUADRATIC = ("fq", "N m s^2/rad^2", 17, "f", "q", "quadratic", "N s^2/m^2", None)
-    LOAD = ("fl", "1", 18, "f", "l", "load", "1", None)
+    LOAD = ("fl", "", 18, "f", "l", "load", "", None)
 
     def __init__(
         self, symbol: str, unit: str, preference: int, letter: str, axes: str,
@@ -82,7 +82,7 @@ INERTIAL = (
 DRIVE = tuple(kind for kind in Kind if kind.key)
 """What a drive adds to the torques: inertia of its rotor, friction, a constant, a spring."""
 
-WITH_SIGN = (Kind.COULOMB, Kind.STRIBECK, Kind.LOAD)
+SIGN_FRICTION = (Kind.COULOMB, Kind.STRIBECK, Kind.LOAD)
 """Friction that has the sign of the speed as a factor."""
 
 LAST = max(kind.preference for kind in Kind) + 1

@@ -143,6 +143,10 @@ _KINDS = {
     "fc": "Coulomb friction",
     "off": "constant torque",
     "k": "stiffness",
+    "fs": "Stribeck friction",
+    "fa": "asymmetric viscous friction",
+    "fq": "quadratic friction",
+    "fl": "load-dependent friction",
 }
 """What letters stand for, by those that are explained together."""
 

@@ -39,6 +39,10 @@ _OF_TABLES: Mapping[str, Mapping[str, str]] = {
         "fc": "Coulomb friction",
         "off": "constant torque or force",
         "k": "stiffness of a spring",
+        "fs": "Stribeck friction",
+        "fa": "viscous friction that differs by direction",
+        "fq": "quadratic friction",
+        "fl": "friction per gravity torque",
     },
     "proofs": {
         "no subset below": "proven: no subset of at most n parameters has a smaller torque error",

@@ -90,8 +90,8 @@ class Robot(Section):
     unmeasured: list[Name] = []
     """Independent coordinates whose torques are not measured, such as those of a floating base: base parameters, fits and errors leave them out."""
 
-    _bodies: FloatArray | None = PrivateAttr(None)
-    """Parameters of the bodies and payloads that were found with the friction, SI; None without that."""
+    _bodies: tuple[float, ...] = PrivateAttr(())
+    """Parameters of the bodies and payloads that were found with the friction, SI; empty without that."""
 
     @property
     def n_dof(self) -> int:
@@ -127,8 +127,7 @@ class Robot(Section):
         if all(parameter.kind is not Kind.LOAD for parameter in parameters):
             return None
         values = self.get_values()
-        if self._bodies is not None:
-            values[: self._bodies.size] = self._bodies
+        values[: len(self._bodies)] = self._bodies
         return values
 
     def stretch(self, stretch: Callable[[float], float]) -> Robot:
@@ -152,7 +151,7 @@ class Robot(Section):
         for k, name in enumerate(search.drives):
             drives[name] = drives[name].apply_friction(search, k)
         result = self.model_copy(update={"drives": drives})
-        result._bodies = search.bodies
+        result._bodies = tuple(search.bodies.tolist())
         return result
 
     def list_parameters(self) -> tuple[Parameter, ...]:

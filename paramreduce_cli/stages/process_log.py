@@ -31,8 +31,7 @@ def process_log(
 ) -> MeasuredLog:
     """Process logs: clean, filter, differentiate and split them.
 
-    The cut-off frequencies, and the shape of friction where the config asks for that, are chosen by cross-validation
-    within the training part. The result includes sentences on each processing step, and warnings about suspicious data.
+    The cut-off frequencies, and the shape of friction where the config asks for that, are chosen within the training part. The result includes sentences on each processing step, and warnings about suspicious data.
 
     Raises:
         ConfigError: The config names no log.

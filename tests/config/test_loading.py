@@ -86,12 +86,30 @@ def test_errors_name_file_line_key_and_remedy(write_config, old, new, line, says
 )
 def test_friction_per_load_needs_an_open_tree_and_masses(robot, override, says):
     name = config_of(robot).build_mechanism().coordinate_names[0]
-    massless = ["parameter_sets={none: {}}"] if robot == "two_link" else []
+    massless = ["parameter_sets={none: {upper: {}, fore: {}}}"] if robot == "two_link" else []
     lines = errors_of(
         CONFIGS / f"{robot}.yaml", override.format(name.removeprefix("z_")), *massless
     )
     assert f"drives.{name}.load" in lines[0]
     assert says in " ".join(lines)
+
+
+def test_friction_per_load_is_left_to_a_log_where_one_decides():
+    massless = ["parameter_sets={none: {upper: {}, fore: {}}}", "nominal_torque=[20, 5]"]
+    log = ["sampling={log: {files: log.csv}}", "validation.accept={}"]
+    drives = "drives={all: {friction: auto}, z_upper: {load: unknown}}"
+    config = load_config(CONFIGS / "two_link.yaml", [drives, *massless, *log])
+    assert config.build_mechanism().nominal is not None
+    names = errors_of(
+        CONFIGS / "two_link.yaml", "drives={all: {load: 0.1, smoothing: 1}}", "parameters=nope"
+    )
+    assert "nope" in " ".join(names)
+
+
+def test_friction_per_load_leaves_out_a_payload_that_is_to_be_found():
+    payload = ["payloads={tool: {body: fore, at: [0, 0, 0]}}", "identification.payloads=[tool]"]
+    lines = errors_of(CONFIGS / "two_link.yaml", "drives.z_fore={load: 0.1}", *payload)
+    assert "leaves out the weight of the payloads" in " ".join(lines)
 
 
 def test_all_errors_of_a_file_come_at_once(write_config):

@@ -270,7 +270,10 @@ def test_noise_is_what_lies_above_the_band():
         (lambda log: log | {"dq1": log["dq2"], "dq2": log["dq1"]}, "columns swapped"),
         (lambda log: log | {"dq1": np.degrees(log["dq1"])}, "is the speed in degrees"),
         (lambda log: log | {"dq1": np.full_like(log["t"], 0.2)}, "recorded speeds are constant"),
-        (lambda log: log | lag_speeds(log, 0.004), "recorded speeds come 4 ms after"),
+        (
+            lambda log: log | lag_speeds(log, 0.004),
+            "recorded speeds lag the positions by about 4 ms",
+        ),
         (lambda log: log | {"tau1": np.clip(log["tau1"], -5, 5)}, "at a limit"),
         (lambda log: log | {"tau2": np.zeros_like(log["t"])}, "are constant"),
         (

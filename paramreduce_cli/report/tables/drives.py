@@ -1,6 +1,6 @@
 """Rotors, friction and springs: along what they act, and their parameters."""
 
-from paramreduce_cli.records import DRIVE, WITH_SIGN, Drive, Kind, Mechanism, Parameter
+from paramreduce_cli.records import DRIVE, SIGN_FRICTION, Drive, Kind, Mechanism, Parameter
 from paramreduce_cli.report.data import ReportData
 from paramreduce_cli.report.page_sections import PageSection, placed
 from paramreduce_cli.texts.table import Table
@@ -26,7 +26,7 @@ def drives(data: ReportData) -> Table:
             else ""
             for kind in kinds
         ]
-        sign = _sign(drive) if columns.keys() & set(WITH_SIGN) else ""
+        sign = _sign(drive) if columns.keys() & set(SIGN_FRICTION) else ""
         if Kind.STRIBECK in columns:
             sign += f"; Stribeck beyond {drive.stribeck_velocity:g}"
         slack = f"{drive.rest:g}" if Kind.STIFFNESS in columns else ""
@@ -36,7 +36,7 @@ def drives(data: ReportData) -> Table:
 
 
 def _format_cell(parameter: Parameter, value: float) -> str:
-    return f"{value:g} {parameter.unit}".replace("^2", "²")
+    return f"{value:g} {parameter.unit}".strip().replace("^2", "²")
 
 
 def _describe_motion(mechanism: Mechanism, drive: Drive) -> str:
