@@ -6,7 +6,7 @@ least squares [Golub2003]). Load-dependent friction comes last, because its load
 columns are computed again.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -23,7 +23,7 @@ from paramreduce_cli.identification.friction_shapes import (
     Candidate,
     SelectedShapes,
     ShapeSearch,
-    list_candidates,
+    list_signs,
 )
 from paramreduce_cli.identification.state_estimation import (
     PER_STATE_CUTOFF,
@@ -58,6 +58,7 @@ class FrictionModel:
     Attributes:
         drives: The drives.
         fixed: Whether the config gives the smoothing of each drive.
+        given: Terms of each drive that the config gives.
         independent: Indices of the independent coordinates among the generalised ones, (n_dof,).
         kept: The other base parameters' columns.
         inertial: Whether these are of bodies and payloads.
@@ -68,6 +69,7 @@ class FrictionModel:
 
     drives: tuple[Drive, ...]
     fixed: tuple[bool, ...]
+    given: tuple[tuple[Candidate, ...], ...]
     independent: tuple[int, ...]
     kept: IntArray
     inertial: BoolArray
@@ -116,12 +118,23 @@ def make_friction_model(
     return FrictionModel(
         drives,
         tuple(drive.name in given for drive in drives),
+        tuple(_list_given(drive, mechanism.find_drive_columns(drive)) for drive in drives),
         tuple(mechanism.independent),
         kept,
         inertial[kept],
         int(inertial.sum()),
         make_column_function(dynamics, kept),
         mechanism.loops is not None,
+    )
+
+
+def _list_given(drive: Drive, kinds: Collection[Kind]) -> tuple[Candidate, ...]:
+    """Return the terms of friction that a drive has, beside Coulomb friction."""
+    speeds = {Kind.STRIBECK: drive.stribeck_velocity}
+    return tuple(
+        Candidate(Kind.COULOMB if kind is Kind.STRIBECK else kind, speeds.get(kind, 0.0))
+        for kind in _FRICTION
+        if kind is not Kind.COULOMB and kind in kinds
     )
 
 
@@ -149,28 +162,63 @@ def select_friction(
     if not model.drives:
         return None
     fastest = _find_largest_speeds(pieces, rate, cutoffs.state, model)
-    candidates = [
-        list_candidates(drive, speed) for drive, speed in zip(model.drives, fastest, strict=True)
-    ]
+    signs = [list_signs(drive, speed) for drive, speed in zip(model.drives, fastest, strict=True)]
 
     def select(
-        candidates: Sequence[Sequence[Candidate]], parameters: FloatArray | None = None
+        candidates: Sequence[Sequence[Candidate]],
+        given: Sequence[Sequence[int]],
+        parameters: FloatArray | None = None,
     ) -> ShapeSearch | None:
         """Return the search among the candidates, or None if the log is too short; the parameters give the load."""
         band = _compute_band(pieces, rate, cutoffs, model, candidates, parameters, n_folds)
-        return None if band is None else ShapeSearch(band, candidates, model.fixed, measured)
+        return None if band is None else ShapeSearch(band, candidates, given, model.fixed, measured)
 
-    search = select(candidates)
-    if search is None:
+    def search(
+        given: Sequence[Sequence[Candidate]],
+    ) -> tuple[SelectedShapes, SelectedShapes] | None:
+        """Return the smoothings with some given terms, then with the terms that help."""
+        without_load = [[c for c in terms if c.kind is not Kind.LOAD] for terms in given]
+        pairs = list(zip(signs, without_load, strict=True))
+        smoothings = select(
+            [[*own, *terms] for own, terms in pairs],
+            [range(len(own), len(own) + len(terms)) for own, terms in pairs],
+        )
+        if smoothings is None:
+            return None
+        first = smoothings.choose_smoothings()
+        candidates = [
+            [sign, *terms, *_list_terms(own, terms, closed=model.closed)]
+            for (sign, *_), own, terms in zip(first.columns, signs, given, strict=True)
+        ]
+        candidates = [
+            [replace(c, speed=own[0].speed) if c.kind is Kind.LOAD else c for c in own]
+            for own in candidates
+        ]
+        terms = select(candidates, [range(1, 1 + len(own)) for own in given], first.parameters)
+        return None if terms is None else (first, terms.choose_terms())
+
+    found = search(model.given)
+    if found is None:
         return None
-    first = found = search.choose_shape()
-    loads = [(*own, Candidate(Kind.LOAD, own[0].speed)) for own in first.columns]
-    search = None if model.closed else select(loads, first.parameters)
-    if search is not None:
-        found = search.extend(first.columns)
+    first, selected = found
+    usual = first.usual_error
+    if [len(own) - 1 for own in selected.columns] != [len(terms) for terms in model.given]:
+        # A term that was missing may have distorted the smoothings.
+        again = search([own[1:] for own in selected.columns])
+        if again is not None and again[1].error < selected.error:
+            first, selected = again
     bodies = np.zeros(model.n_inertial)
     bodies[model.kept[model.inertial]] = first.parameters[model.inertial]
-    return _make_record(model.drives, found, bodies, first.usual_error)
+    return _make_record(model.drives, selected, bodies, usual)
+
+
+def _list_terms(
+    signs: Sequence[Candidate], given: Sequence[Candidate], *, closed: bool
+) -> list[Candidate]:
+    """Return the terms that a drive may have besides those that the config gives."""
+    kinds = {term.kind for term in given}
+    usual = [Kind.ASYMMETRY, Kind.QUADRATIC, *([] if closed else [Kind.LOAD])]
+    return [*signs, *(Candidate(kind) for kind in usual if kind not in kinds)]
 
 
 def _make_record(

@@ -42,11 +42,10 @@ class Candidate:
     speed: float = 0.0
 
 
-def list_candidates(drive: Drive, fastest: float) -> list[Candidate]:
-    """Return the columns that a drive may have: signs of all smoothings, the given one first, then other terms."""
+def list_signs(drive: Drive, fastest: float) -> list[Candidate]:
+    """Return the signs of all smoothings that a drive may have, the given one first."""
     speeds = [drive.smoothing, *(share * fastest for share in _SMOOTHINGS)]
-    signs = [Candidate(Kind.COULOMB, speed) for speed in speeds]
-    return [*signs, Candidate(Kind.ASYMMETRY), Candidate(Kind.QUADRATIC)]
+    return [Candidate(Kind.COULOMB, speed) for speed in speeds]
 
 
 @dataclass(frozen=True)
@@ -85,6 +84,7 @@ class ShapeSearch:
     Args:
         band: Triangular factors of all columns.
         candidates: Candidates of each drive, a sign first.
+        given: Indices of the terms that each drive has in any case.
         fixed: Whether the config gives the smoothing of each drive, (n_drives,).
         measured: Joints whose torques are measured, (n_dof,).
     """
@@ -93,6 +93,7 @@ class ShapeSearch:
         self,
         band: Band,
         candidates: Sequence[Sequence[Candidate]],
+        given: Sequence[Sequence[int]],
         fixed: Sequence[bool],
         measured: BoolArray,
     ) -> None:
@@ -100,7 +101,7 @@ class ShapeSearch:
         counts = [len(own) for own in candidates]
         self._n_rest = band.factors.shape[-1] - 1 - sum(counts)
         self._starts = self._n_rest + np.cumsum([0, *counts[:-1]])
-        self._start = tuple(_Choice(0) for _ in candidates)
+        self._start = tuple(_Choice(0, tuple(terms)) for terms in given)
         T = self._combine_columns(self._start, band.factors.shape[-1])
         factors = band.factors @ T
         squares = np.sum(factors[..., -1] ** 2, axis=(0, 2)) / band.n_samples
@@ -136,28 +137,25 @@ class ShapeSearch:
             errors.append(max(0.0, float(residual @ tested @ residual)))
         return np.array(errors) / plain[:, -1, -1].sum()
 
-    def choose_shape(self) -> SelectedShapes:
-        """Return the choice: one smoothing for all drives, then one for each, then terms one after the other."""
+    def choose_smoothings(self) -> SelectedShapes:
+        """Return the choice: one smoothing for all drives, then one for each."""
         choices, best = self._start, self._compute_residual(self._start)
         for k in range(1, 1 + len(_SMOOTHINGS)):
-            common = tuple(_Choice(0 if fixed else k) for fixed in self._fixed)
+            common = tuple(
+                _Choice(0 if fixed else k, choice.terms)
+                for choice, fixed in zip(self._start, self._fixed, strict=True)
+            )
             residual = self._compute_residual(common)
             choices, best = (common, residual) if residual < best else (choices, best)
         for _ in range(_SWEEPS):
             choices, best = self._choose_smoothings(choices, best)
         choices = self._refine_smoothings(choices, best)
-        choices, best = self._add_terms(choices, self._score(choices))
-        return self._describe(choices, best, self._score(self._start))
+        return self._describe(choices, self._score(choices), self._score(self._start))
 
-    def extend(self, columns: Sequence[Sequence[Candidate]]) -> SelectedShapes:
-        """Return the choice of the first columns of each drive, with those of its further candidates that lower the error.
-
-        Args:
-            columns: The columns that each drive has.
-        """
-        start = tuple(_Choice(0, tuple(range(1, len(own)))) for own in columns)
-        usual = self._score(start)
-        choices, best = self._add_terms(start, usual)
+    def choose_terms(self) -> SelectedShapes:
+        """Return the first candidate of each drive with the terms that lower the error, one after the other."""
+        usual = self._score(self._start)
+        choices, best = self._add_terms(self._start, usual)
         return self._describe(choices, best, usual)
 
     def _compute_residual(self, choices: Sequence[_Choice]) -> float:
@@ -177,7 +175,7 @@ class ShapeSearch:
         """Return the choice with another smoothing for those drives that gain by it."""
         for j, fixed in enumerate(self._fixed):
             for k in range(0 if fixed else 1 + len(_SMOOTHINGS)):
-                other = (*choices[:j], _Choice(k), *choices[j + 1 :])
+                other = (*choices[:j], _Choice(k, choices[j].terms), *choices[j + 1 :])
                 residual = self._compute_residual(other)
                 if residual < (1 - _GAIN) * best:
                     choices, best = other, residual
@@ -194,14 +192,16 @@ class ShapeSearch:
                 sign: float, j: int = j, others: tuple[_Choice, ...] = choices
             ) -> float:
                 """Return the residual with a sign of the j-th drive."""
-                return self._compute_residual((*others[:j], _Choice(sign), *others[j + 1 :]))
+                return self._compute_residual(
+                    (*others[:j], _Choice(sign, others[j].terms), *others[j + 1 :])
+                )
 
             bounds = max(_GEOMETRIC, choice.sign - 1), min(last, choice.sign + 1)
             found = scipy.optimize.minimize_scalar(
                 compute_residual, bounds=bounds, method="bounded", options={"xatol": _STEP}
             )
             if found.fun < best:
-                choices = (*choices[:j], _Choice(float(found.x)), *choices[j + 1 :])
+                choices = (*choices[:j], _Choice(float(found.x), choice.terms), *choices[j + 1 :])
                 best = float(found.fun)
         return choices
 

@@ -58,7 +58,7 @@ def describe_friction(search: FrictionSearch | None) -> Iterator[str]:
     for term, chosen in terms:
         names = [name for name, flag in zip(search.drives, chosen, strict=True) if flag]
         if names:
-            yield f"Friction: {term} terms are added to {', '.join(names)}."
+            yield f"Friction: {', '.join(names)} with {term} terms."
 
 
 def describe_cutoff(cutoff: float) -> str:

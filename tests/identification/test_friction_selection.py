@@ -7,7 +7,7 @@ from simulated_logs import FRICTION, TWO_LINK, two_link_log
 from paramreduce_cli.config import load_config
 from paramreduce_cli.config.log_settings import LogSection
 from paramreduce_cli.identification import band_scoring, friction_selection
-from paramreduce_cli.identification.friction_shapes import ShapeSearch, list_candidates
+from paramreduce_cli.identification.friction_shapes import ShapeSearch, list_signs
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.records import Kind, RawLog, RawLogs
 from paramreduce_cli.stages.process_log import process_logs_of_robot
@@ -89,6 +89,20 @@ def test_a_term_is_added_where_it_is(term, factor):
     assert changed.automatic_friction == []
 
 
+def test_terms_that_the_config_gives_are_part_of_the_search():
+    """The friction of the search is that of the model: what is given is not made up for by other terms."""
+
+    def friction(dz):
+        tau = np.sign(dz) * [0.3, 0.5] + [0.8, 0.2] * dz
+        return tau + 0.3 * np.abs(dz) * [1, 0]
+
+    drives = {"all": {"friction": "auto"}, "z_upper": {"asymmetry": "unknown"}}
+    given, chosen = (searched(friction, d)[1].friction for d in (drives, AUTO))
+    assert given.asymmetry[0]
+    assert given.error == pytest.approx(chosen.error, rel=0.5)
+    assert given.usual_error < 0.5 * chosen.usual_error
+
+
 @pytest.mark.parametrize("given", [{}, {"z_upper": {"load": "unknown"}}])
 def test_friction_that_grows_with_the_load_is_found(given):
     def friction(dz):
@@ -157,7 +171,7 @@ def test_a_joint_may_rest_in_all_folds_but_one(tremble):
     """Its columns are rounding, or hardly more, in the other folds."""
     rng = np.random.default_rng(0)
     drives = robot().build_mechanism().drives
-    candidates = [list_candidates(drive, 1.0) for drive in drives]
+    candidates = [list_signs(drive, 1.0) for drive in drives]
     folds = []
     for fold in range(5):
         t = 0.01 * np.arange(400) + 4 * fold
@@ -171,5 +185,7 @@ def test_a_joint_may_rest_in_all_folds_but_one(tremble):
         tau = others.sum(axis=2) + np.sign(dz) + 0.02 * rng.normal(size=dz.shape)
         folds.append(np.concatenate([others, *friction, tau[..., None]], axis=2))
     band = band_scoring._factorise(folds)
-    found = ShapeSearch(band, candidates, (False, False), np.ones(2, bool)).choose_shape()
+    found = ShapeSearch(
+        band, candidates, ((), ()), (False, False), np.ones(2, bool)
+    ).choose_smoothings()
     assert found.error < 0.1
