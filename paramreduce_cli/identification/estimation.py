@@ -165,10 +165,10 @@ class LinearFit:
         stacked = np.concatenate([X.reshape(-1, X.shape[2]) for X in scaled])
         R = np.linalg.qr(stacked, mode="r")
         lengths = np.linalg.norm(R, axis=0)
-        lengths = np.where(lengths > 0, lengths, lengths.max(initial=1e-300))
+        lengths = np.where(lengths > 0, lengths, lengths.max() or 1.0)
         _, sizes, directions = np.linalg.svd(R / lengths)
         sizes = np.pad(sizes, (0, lengths.size - sizes.size))
-        least = _UNDETERMINED * sizes[0]
+        least = _UNDETERMINED * (sizes[0] or 1.0)
         factors = directions.T / lengths[:, None] / np.maximum(sizes, least)
         return factors[:, sizes > least], factors[:, sizes <= least]
 

@@ -2,8 +2,8 @@
 
 Friction is linear in its parameters but for a few shape parameters: the speed at which Coulomb friction is smoothed, and
 the speed beyond which Stribeck friction fades. Given these, all parameters follow from linear least squares (separable
-least squares [Golub2003]). Load-dependent friction comes last, because its load is the gravity torque of the parameters that were fitted before; for it the
-columns are computed again.
+least squares [Golub2003]). Terms come after smoothings, because the load of load-dependent friction is the gravity torque of the
+parameters that were fitted with the smoothings.
 """
 
 from collections.abc import Collection, Iterable, Sequence
@@ -176,7 +176,11 @@ def select_friction(
     def search(
         given: Sequence[Sequence[Candidate]],
     ) -> tuple[SelectedShapes, SelectedShapes] | None:
-        """Return the smoothings with some given terms, then with the terms that help."""
+        """Return the smoothings that suit some terms, then those with the terms that help.
+
+        Args:
+            given: Terms of each drive while smoothings are chosen; afterwards all but those of the config are chosen anew.
+        """
         without_load = [[c for c in terms if c.kind is not Kind.LOAD] for terms in given]
         pairs = list(zip(signs, without_load, strict=True))
         smoothings = select(
@@ -188,13 +192,15 @@ def select_friction(
         first = smoothings.choose_smoothings()
         candidates = [
             [sign, *terms, *_list_terms(own, terms, closed=model.closed)]
-            for (sign, *_), own, terms in zip(first.columns, signs, given, strict=True)
+            for (sign, *_), own, terms in zip(first.columns, signs, model.given, strict=True)
         ]
         candidates = [
             [replace(c, speed=own[0].speed) if c.kind is Kind.LOAD else c for c in own]
             for own in candidates
         ]
-        terms = select(candidates, [range(1, 1 + len(own)) for own in given], first.parameters)
+        terms = select(
+            candidates, [range(1, 1 + len(own)) for own in model.given], first.parameters
+        )
         return None if terms is None else (first, terms.choose_terms())
 
     found = search(model.given)

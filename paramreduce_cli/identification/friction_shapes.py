@@ -18,7 +18,7 @@ from paramreduce_cli.records import BoolArray, Drive, FloatArray, IntArray, Kind
 _RATIO = 1.5
 """Ratio of neighbouring speeds of smoothing."""
 _SMOOTHINGS = (0.0, *(0.01 * _RATIO**k for k in range(10)))
-"""Speeds of smoothing that are tried, a share of the largest speed of the drive."""
+"""Speeds of smoothing that are tried, relative to the largest speed of the drive."""
 _GAIN = 0.002
 """Relative decrease of the residual for which a joint gets another smoothing than the others."""
 _TERM_GAIN = 0.02

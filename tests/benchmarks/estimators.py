@@ -111,23 +111,24 @@ class _Logs:
 
     def fit_directly(self, estimate):
         """Estimates of a function of columns, torques and deviations, and seconds of each."""
-        begun = time.perf_counter()
+        start = time.perf_counter()
         values = [
             estimate(rows, np.concatenate(rows.X), np.concatenate(rows.tau), fit.deviation)
             for rows, fit in zip(self.rows, self.fits, strict=True)
         ]
-        return np.array(values), (time.perf_counter() - begun) / len(values)
+        return np.array(values), (time.perf_counter() - start) / len(values)
 
     def fit_by_reference(self):
         """Instrumental variables whose instruments are the columns of the commanded motion."""
-        Z = np.concatenate(self.collect(self.arm.reference[0], 0 * self.arm.reference[0] + 1.0).X)
+        commands = self.arm.reference[0]
+        Z = np.concatenate(self.collect(commands, np.ones_like(commands)).X)  # torques do not enter
         return self.fit_directly(
             lambda rows, X, tau, deviation: fit_instrumental(X, tau, Z, deviation)
         )
 
     def fit_by_simulation(self, estimate):
         """Estimates of a function that also takes the columns of a simulation; not a number where that diverges."""
-        begun = time.perf_counter()
+        start = time.perf_counter()
         values = np.array([fit.parameters for fit in self.fits])
         for _ in range(_SIMULATIONS):
             motion = self.arm.simulate(self.arm.complete(values))
@@ -138,7 +139,7 @@ class _Logs:
                 Z = np.concatenate(self.collect(motion.q[k], motion.tau[k]).X)
                 X, tau = np.concatenate(rows.X), np.concatenate(rows.tau)
                 values[k] = estimate(X, tau, Z, self.fits[k].deviation)
-        return values, (time.perf_counter() - begun) / len(values)
+        return values, (time.perf_counter() - start) / len(values)
 
 
 _DIRECT = {

@@ -99,6 +99,9 @@ def test_terms_that_the_config_gives_are_part_of_the_search():
     drives = {"all": {"friction": "auto"}, "z_upper": {"asymmetry": "unknown"}}
     given, chosen = (searched(friction, d)[1].friction for d in (drives, AUTO))
     assert given.asymmetry[0]
+    for name in ("smoothing", "asymmetry", "quadratic", "load", "stribeck_velocity"):
+        assert np.array_equal(getattr(given, name), getattr(chosen, name), equal_nan=True)
+    # Joints are weighted by the noise that the friction leaves which the search began with.
     assert given.error == pytest.approx(chosen.error, rel=0.5)
     assert given.usual_error < 0.5 * chosen.usual_error
 

@@ -242,7 +242,7 @@ def test_only_common_times_of_topics_are_used():
     found = read_signals(RawLog("x", topics(), None), section(columns=other), NAMES)
     assert found.time[0] >= 0
     assert found.time[-1] <= 1.995
-    assert np.allclose(found.z, np.sin(np.outer(found.time, [1, 2])), atol=2e-5)
+    assert np.allclose(found.z, np.sin(np.outer(found.time, [1, 2])), atol=1e-5)
 
 
 def test_topics_of_equal_length_are_joined_by_their_times():
