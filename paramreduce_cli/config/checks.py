@@ -219,6 +219,13 @@ def _check_simulation(config: Config) -> Iterator[Problem]:
     sampling = config.sampling
     if any(sampling.list_recordings().values()) or sampling.symmetries:
         yield path, "makes all sets; leave out files and symmetries"
+    still = [name for name in names if name not in {*section.inputs, *config.unmeasured}]
+    if still and config.nominal_torque == "standard-deviation":
+        yield (
+            ("nominal_torque",),
+            f"is missing: {', '.join(still)} has no input and so no torque, whose standard deviation is no scale. Give "
+            "characteristic torques of all independent coordinates, N m (N)",
+        )
 
 
 def _check_inertia(config: Config) -> Iterator[Problem]:
@@ -268,9 +275,10 @@ def _name_coordinates(config: Config) -> str:
 
 def _check_limits(config: Config) -> Iterator[Problem]:
     """Yield problems of position limits, and of numbers of points, harmonics and starts that do not fit each other."""
-    for k, (lower, upper) in enumerate(config.trajectories.position_limits):
+    given = config.trajectories.position_limits or []
+    for k, (lower, upper) in enumerate(given):
         path: Key = ("trajectories", "position_limits")
-        if len(config.trajectories.position_limits) > 1:
+        if len(given) > 1:
             path = (*path, k)
         if not np.isfinite([lower, upper]).all():
             yield path, f"[{lower:g}, {upper:g}] must be finite"
@@ -294,12 +302,25 @@ def _check_limits(config: Config) -> Iterator[Problem]:
         yield ("trajectories", "polished"), f"is {t.polished}, but there are {t.starts} starts"
 
 
+def _check_limits_given(config: Config) -> Iterator[Problem]:
+    """Yield problems of limits that are missing, where motions or states are looked for within them."""
+    purpose = ""
+    if config.sampling.needs_trajectories and config.trajectories.file is None:
+        purpose = "trajectories are looked for within them. Give them, or samples by sampling.simulation or sampling.log"
+    elif config.terms is not None:
+        purpose = "terms are pruned for all states within them"
+    for key in ("position_limits", "velocity_limits"):
+        path = ("trajectories", key)
+        if purpose and read_per_joint(config, path) is None:
+            yield path, f"is missing, in {PER_JOINT[path]}: {purpose}"
+
+
 def _check_acceptance(config: Config) -> Iterator[Problem]:
     """Yield problems of limits of errors on a test set, if the config leads to no test set."""
     sampling, motions = config.sampling, config.trajectories
     if sampling.test_file is not None:
         return
-    if sampling.log is not None or (sampling.estimation_file and sampling.validation_file):
+    if not sampling.needs_trajectories and sampling.simulation is None:
         instead = "torque_error_validation is on what was held out"
     elif sampling.simulation is not None and not sampling.simulation.test_runs:
         instead = "give sampling.simulation.test_runs"
@@ -382,6 +403,7 @@ _CHECKS: tuple[Check, ...] = (
     _check_loads,
     _check_per_joint,
     _check_limits,
+    _check_limits_given,
     _check_acceptance,
     _check_unmeasured,
     _check_base_columns,
@@ -405,7 +427,7 @@ def _warn_of_bodies(config: Config) -> Iterator[str]:
 
 def _warn_of_limits(config: Config) -> Iterator[str]:
     """Yield positions that hardly any joint reaches."""
-    for lower, upper in config.trajectories.position_limits:
+    for lower, upper in config.trajectories.position_limits or []:
         if max(abs(lower), abs(upper)) > RATHER_DEGREES:
             yield f"trajectories.position_limits of [{lower:g}, {upper:g}] are in rad (m), not degrees"
             return

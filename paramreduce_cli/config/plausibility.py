@@ -86,7 +86,7 @@ def _estimate_size(config: Config) -> float:
         shifts = (frame[:3, 3] for frame in (body.parent_to_joint, body.joint_to_body))
         reach.append(before + sum(float(np.linalg.norm(shift)) for shift in shifts))
     joints = {body.coordinate: body.joint for body in rigid}
-    given = config.trajectories.position_limits
+    given = config.trajectories.position_limits or []
     names = bodies.list_independent_coordinates()
     ranges = given * len(names) if len(given) == 1 else given
     slides = [
@@ -106,7 +106,8 @@ def find_implausible_gravity(config: Config) -> Iterator[str]:
 
 def find_implausible_speeds(config: Config) -> Iterator[str]:
     """Yield a sentence if a velocity limit is above the speed of most joints."""
-    fast = [limit for limit in config.trajectories.velocity_limits if _FASTEST < limit < np.inf]
+    given = config.trajectories.velocity_limits or []
+    fast = [limit for limit in given if _FASTEST < limit < np.inf]
     if fast:
         yield (
             f"trajectories.velocity_limits of {max(fast):g} are in rad/s (m/s), not degrees or revolutions per minute"

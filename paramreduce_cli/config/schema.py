@@ -75,10 +75,10 @@ class TrajectoriesSection(Section):
     """s"""
     points: Annotated[Whole, Field(ge=4, le=10_000_000)] = 100
     """Grid points over a period on which criterion and limits are evaluated; the search finds its way on 25 for every harmonic, if these are fewer."""
-    position_limits: PairPerJoint
-    """[lower, upper] for all joints, or a list of one pair per joint; rad (m if prismatic)."""
-    velocity_limits: LimitPerJoint
-    """Largest speed, one for all joints or a list; rad/s (m/s if prismatic)."""
+    position_limits: PairPerJoint | None = None
+    """[lower, upper] for all joints, or a list of one pair per joint; rad (m if prismatic). Needed where trajectories are optimised or terms are pruned."""
+    velocity_limits: LimitPerJoint | None = None
+    """Largest speed, one for all joints or a list; rad/s (m/s if prismatic). Needed with position_limits."""
     acceleration_limits: LimitPerJoint | None = None
     """Largest acceleration, one for all joints or a list; rad/s^2 (m/s^2 if prismatic)."""
     torque_limits: LimitPerJoint | None = None
@@ -114,11 +114,12 @@ class TrajectoriesSection(Section):
 
     def build_limits(self, n_dof: int) -> JointLimits:
         """Return the limits of every joint."""
-        pairs = np.broadcast_to(np.array(self.position_limits, dtype=float), (n_dof, 2))
+        given = self.position_limits or [[-np.inf, np.inf]]
+        pairs = np.broadcast_to(np.array(given, dtype=float), (n_dof, 2))
         return JointLimits(
             lower=pairs[:, 0],
             upper=pairs[:, 1],
-            velocity=expand_per_joint(self.velocity_limits, n_dof),
+            velocity=expand_per_joint(self.velocity_limits or [np.inf], n_dof),
             acceleration=expand_per_joint(self.acceleration_limits or [np.inf], n_dof),
             torque=expand_per_joint(self.torque_limits or [np.inf], n_dof),
             power=expand_per_joint(self.power_limits or [np.inf], n_dof),
@@ -203,6 +204,16 @@ class SamplingSection(Section):
     def list_recordings(self) -> dict[str, Path | None]:
         """Return the files of recorded states by set; None where there is none."""
         return {name: getattr(self, f"{name}_file") for name in SETS}
+
+    @property
+    def recorded(self) -> bool:
+        """Whether the estimation and the validation set are recordings."""
+        return self.estimation_file is not None and self.validation_file is not None
+
+    @property
+    def needs_trajectories(self) -> bool:
+        """Whether states come from trajectories, and not from logs, a simulation or recordings of both sets."""
+        return self.log is None and self.simulation is None and not self.recorded
 
     @property
     def measured(self) -> bool:
@@ -440,7 +451,7 @@ class Config(Robot):
     """The robot file it was made from."""
     model: ModelSection = ModelSection()
     """Base parameters."""
-    trajectories: TrajectoriesSection
+    trajectories: TrajectoriesSection = TrajectoriesSection()
     """Exciting trajectories."""
     sampling: SamplingSection = SamplingSection()
     """Estimation and validation sets."""

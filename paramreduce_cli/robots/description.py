@@ -162,7 +162,7 @@ class Robot(Section):
         return (
             *(Parameter(kind, name) for name in rigid for kind in INERTIAL),
             *(
-                Parameter(kind, name, slides.issuperset(section.motion or [name]))
+                Parameter(kind, name, section.is_along_line(name, slides))
                 for name, section in self.list_drives().items()
                 for kind in section.get_values()
             ),

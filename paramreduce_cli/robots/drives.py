@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from typing import Annotated, Literal
 
 import numpy as np
@@ -97,6 +97,21 @@ class DriveSection(Section):
             update["stribeck_velocity"] = float(search.stribeck_velocity[k])
         update |= {"smoothing": float(search.smoothing[k]), "friction": "given"}
         return self.model_copy(update=update)
+
+    def is_along_line(self, name: str, slides: Collection[str]) -> bool:
+        """Return whether the motion is in m and not in rad.
+
+        A weighted sum of sliding and turning coordinates has the unit of those whose weight is one: of the sliding ones
+        if both have it, as where a point moves with a body that also turns.
+
+        Args:
+            name: Name of the drive.
+            slides: Names of the coordinates that slide.
+        """
+        motion = self.motion or {name: 1.0}
+        sliding = [coordinate in slides for coordinate in motion]
+        plain = [slide for slide, w in zip(sliding, motion.values(), strict=True) if abs(w) == 1]
+        return all(sliding) or any(plain) or (any(sliding) and not plain)
 
     def merge_defaults(self, other: DriveSection | None) -> DriveSection:
         """Return the section with missing keys taken from another one."""

@@ -193,12 +193,7 @@ def has_measured_torques(config: Config) -> bool:
     """Return whether the torques of both sets were measured on a machine."""
     if config.sampling.log is not None:
         return True
-    return _is_recorded(config) and config.sampling.torques == "measured"
-
-
-def _is_recorded(config: Config) -> bool:
-    """Whether the estimation and the validation set are recordings, so that no trajectories are needed."""
-    return {"estimation", "validation"} <= list_user_files(config, Recordings).keys()
+    return config.sampling.recorded and config.sampling.torques == "measured"
 
 
 def check_is_part(stage: Stage, config: Config) -> None:
@@ -221,10 +216,8 @@ def list_stages_to_run(config: Config) -> list[Stage]:
     terms need their own inputs and sections.
     """
     logged = config.sampling.log is not None
-    simulated = config.sampling.simulation is not None
-    recorded = logged or simulated or _is_recorded(config)
     idle = {
-        Trajectories: recorded,
+        Trajectories: not config.sampling.needs_trajectories,
         MeasuredLog: not logged,
         Identification: not has_measured_torques(config),
         TermReduction: config.terms is None,

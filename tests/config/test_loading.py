@@ -287,3 +287,34 @@ def test_a_line_that_two_problems_share_is_a_config_error(write_config):
     )
     with pytest.raises(ConfigError, match="too large"):
         load_config(path)
+
+
+def test_simulated_samples_need_no_limits_but_characteristic_torques(tmp_path):
+    text = (CONFIGS / "quarter_car.yaml").read_text()
+    assert "trajectories" not in text
+    path = tmp_path / "quarter_car.yaml"
+    path.write_text(text.replace("nominal_torque: [2000, 2000]\n", ""))
+    (message,) = errors_of(path)
+    assert "nominal_torque is missing: z_chassis has no input" in message
+    assert "N m" in message
+
+
+@pytest.mark.parametrize(
+    ("motion", "unit"),
+    [
+        ("{z_chassis: 1, a_lower: 0.3}", "N s/m"),
+        ("{z_chassis: -1, a_lower: 1}", "N s/m"),
+        ("{z_chassis: 20, a_lower: 1}", "N m s/rad"),
+        ("{z_chassis: 0.5, a_lower: 0.3}", "N s/m"),
+        ("{a_lower: 0.5, a_upper: 0.3}", "N m s/rad"),
+        ("{z_chassis: 50}", "N s/m"),
+    ],
+)
+def test_unit_of_a_drive_along_several_coordinates(tmp_path, motion, unit):
+    text = (CONFIGS / "quarter_car.yaml").read_text()
+    path = tmp_path / "quarter_car.yaml"
+    path.write_text(
+        text.replace("drives:\n", f"drives:\n  mixed: {{motion: {motion}, viscous: 3}}\n")
+    )
+    parameters = {p.name: p for p in load_config(path).list_parameters()}
+    assert parameters["fv_mixed"].unit == unit
