@@ -12,6 +12,7 @@ from paramreduce_cli.export.code_verification import (
     check,
     check_against_mechanism,
     check_closures,
+    check_loop_problems,
     find_unsafe_mass_matrices,
     make_random_cases,
     measure_single_precision,
@@ -21,6 +22,7 @@ from paramreduce_cli.export.term_sizes import estimate_term_sizes
 from paramreduce_cli.export.validity import describe_ranges, describe_validity
 from paramreduce_cli.expressions.functions import Function
 from paramreduce_cli.lean.lean_functions import LeanFunctions
+from paramreduce_cli.lean.loop_kinematics import LoopKinematics
 from paramreduce_cli.records import (
     FloatArray,
     Mechanism,
@@ -95,8 +97,12 @@ def make_exported_model(
     report_progress(Progress(_TASK, 0, 2, "functions"))
     functions = make_functions(model, chosen, what, constant=constant, simplified=simplified)
     closures: tuple[Function, ...] = ()
+    problems: tuple[Function, ...] = ()
+    least_pivots = np.empty(0)
     if mechanism.loops is not None:
         closures = tuple(LeanFunctions(model, chosen, constant=constant).make_closures())
+        kinematics = LoopKinematics(mechanism)
+        problems, least_pivots = kinematics.make_problems(), kinematics.least_pivots
     report_progress(Progress(_TASK, 1, 2, "checks"))
     rng = np.random.default_rng(0)
     checked = make_random_cases(mechanism, chosen, _CHECKED, rng, simplified)
@@ -107,6 +113,7 @@ def make_exported_model(
         check_against_mechanism(model, checked, least)
     if closures:
         check_closures(closures, checked, least)
+        check_loop_problems(problems, least_pivots, checked, least)
     unsafe = ""
     # Without some terms M was positive definite wherever it was looked at where that holds; these states may be beyond.
     if simplified is None and what in (Exported.DDM, Exported.BOTH):
@@ -133,6 +140,8 @@ def make_exported_model(
         constant=constant,
         functions=functions,
         closures=closures,
+        loop_problems=problems,
+        least_pivots=least_pivots,
         single=single,
         cases={name: values for name, values in stored.items() if name in used},
         least=least,

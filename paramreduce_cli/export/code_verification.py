@@ -197,6 +197,33 @@ def check_closures(
         reject_if_wrong(what, off / find_entry_sizes(name, against, least[name]), np.ones(1))
 
 
+def check_loop_problems(
+    problems: tuple[Function, ...],
+    least_pivots: FloatArray,
+    stored: Mapping[str, FloatArray],
+    least: Mapping[str, float],
+) -> None:
+    """Check the solved problems of loops on states whose pivots are trusted.
+
+    Args:
+        problems: Functions that solve the position, velocity and acceleration problems.
+        least_pivots: Magnitudes below which pivots are not trusted, (n_d,).
+        stored: States of closed loops with R and b, (n_states, ...) by name.
+        least: Smallest sizes that results are judged by, by name.
+
+    Raises:
+        FormulationError: A solution is wrong.
+    """
+    for function in problems:
+        values = _evaluate_function(function, stored)
+        trusted = (np.abs(values.pop("pivots")) >= least_pivots).all(axis=1)
+        for name, got in values.items():
+            expected = np.zeros_like(got) if name == "step" else stored[name]
+            sizes = np.ones(1) if name == "step" else find_entry_sizes(name, expected, least[name])
+            off = ((got - expected) / sizes)[trusted]
+            reject_if_wrong(f"{function.name}: {name}", off, np.ones(1))
+
+
 def _evaluate_function(
     function: Function, stored: Mapping[str, FloatArray]
 ) -> dict[str, FloatArray]:

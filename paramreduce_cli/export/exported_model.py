@@ -44,6 +44,10 @@ class ExportedModel:
     functions: tuple[Function, ...]
     closures: tuple[Function, ...]
     """Closures of a mechanism with loops; empty for a tree."""
+    loop_problems: tuple[Function, ...]
+    """Newton's correction, and the velocity and acceleration problems of loops, solved with pivots in a fixed order."""
+    least_pivots: FloatArray
+    """Magnitudes of the pivots below which these solutions are not trusted, (n_d,)."""
     single: bool
     """Whether numbers have single precision, where the language has a choice."""
     cases: Mapping[str, FloatArray]

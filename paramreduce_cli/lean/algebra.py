@@ -81,6 +81,10 @@ class Scalar:
         """Return the cosine of an angle."""
         return Scalar(self.graph, self.graph.call("cos", self.value))
 
+    def invert(self) -> Scalar:
+        """Return the reciprocal."""
+        return Scalar(self.graph, self.graph.call("inv", self.value))
+
     def sign(self) -> Scalar:
         """Return the sign: -1, 0 or 1."""
         return Scalar(self.graph, self.graph.call("sign", self.value))

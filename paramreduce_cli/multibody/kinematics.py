@@ -85,27 +85,39 @@ def make_joint_motions(mechanism: Mechanism, q: ca.SX) -> list[JointMotion]:
     return [make_joint_motion(body, q[i]) for i, body in enumerate(mechanism.bodies)]
 
 
-def transform_point(joints: list[JointMotion], body: int, point: FloatArray) -> Vector:
-    """Return the position in the base frame of a point given in the frame of a body, m.
+def transform_point(
+    joints: list[JointMotion], body: int, point: FloatArray, ancestor: int = BASE
+) -> Vector:
+    """Return the position in an ancestor's frame of a point given in the frame of a body, m.
 
     Args:
         joints: Motions of the joints, one for each body of the mechanism.
         body: Index of the body, :data:`BASE` for the base.
         point: Position in the body's frame, (3,), m.
+        ancestor: Index of a body between the base and the body, or of the body itself; the base if left out.
     """
     x, y, z = np.asarray(point).tolist()
     position: Vector = (ca.SX(x), ca.SX(y), ca.SX(z))
-    while body != BASE:
+    while body != ancestor:
         position = add(joints[body].origin, joints[body].to_parent(position))
         body = joints[body].body.parent
     return position
 
 
-def transform_direction(joints: list[JointMotion], body: int, direction: FloatArray) -> Vector:
-    """Return the components in the base frame of a direction given in the frame of a body."""
+def transform_direction(
+    joints: list[JointMotion], body: int, direction: FloatArray, ancestor: int = BASE
+) -> Vector:
+    """Return the components in an ancestor's frame of a direction given in the frame of a body.
+
+    Args:
+        joints: Motions of the joints, one for each body of the mechanism.
+        body: Index of the body, :data:`BASE` for the base.
+        direction: Components in the body's frame, (3,).
+        ancestor: Index of a body between the base and the body, or of the body itself; the base if left out.
+    """
     x, y, z = np.asarray(direction).tolist()
     components: Vector = (ca.SX(x), ca.SX(y), ca.SX(z))
-    while body != BASE:
+    while body != ancestor:
         components = joints[body].to_parent(components)
         body = joints[body].body.parent
     return components

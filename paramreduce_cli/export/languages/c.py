@@ -88,10 +88,14 @@ class _Writer:
             "test_arguments": self.test_arguments,
             "test_batch_arguments": self.test_batch_arguments,
             "functions": [self.write_function(f) for f in model.functions],
-            "closures": [self.write_function(f) for f in model.closures],
+            "closures": [self.write_function(f) for f in (*model.closures, *model.loop_problems)],
+            "least_pivots": [self.write_number(value) for value in model.least_pivots.tolist()],
             "stack": self.estimate_stack(),
             "signs": any("sign" in f.program.operations for f in model.functions),
-            "angles": any(_find_dependence(f).angles for f in (*model.functions, *model.closures)),
+            "angles": any(
+                _find_dependence(f).angles
+                for f in (*model.functions, *model.closures, *model.loop_problems)
+            ),
             "sines": self.write_sine_constants(),
             "cases": self.list_cases(),
             "least": {name: self.write_number(size) for name, size in self._model.least.items()},

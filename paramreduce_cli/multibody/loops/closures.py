@@ -5,6 +5,7 @@ without unit, so that every equation is about as large as the gap it measures.
 """
 
 from collections.abc import Callable, Sequence
+from functools import cached_property
 from typing import NamedTuple
 
 import casadi as ca
@@ -16,7 +17,7 @@ from paramreduce_cli.multibody.kinematics import (
     transform_direction,
     transform_point,
 )
-from paramreduce_cli.records import Closure, ClosureKind, Mechanism
+from paramreduce_cli.records import BASE, Closure, ClosureKind, Mechanism
 
 
 def express_equations(mechanism: Mechanism, q: ca.SX) -> ca.SX:
@@ -62,26 +63,39 @@ class _ClosedPair:
             raise ValueError(f"there is no closure of the kind {self.closure.kind!r}")
         return CLOSURES[self.closure.kind].measure(self)
 
+    @cached_property
+    def _ancestor(self) -> int:
+        """The nearest body that carries both bodies, whose motion does not change the equations."""
+        first, second = (self._list_carriers(body) for body in self.closure.bodies)
+        return next(body for body in first if body in second)
+
+    def _list_carriers(self, body: int) -> list[int]:
+        """Return a body and all that carry it, the base last."""
+        carriers = [body]
+        while carriers[-1] != BASE:
+            carriers.append(self._joints[carriers[-1]].body.parent)
+        return carriers
+
     @property
     def gap(self) -> Vector:
-        """Origin of B from that of A, in the base frame, m."""
-        (a, b), (A, B) = self.closure.bodies, self.closure.frames
+        """Origin of B from that of A, in the frame of their nearest common ancestor, m."""
         start, end = (
-            transform_point(self._joints, a, A[:3, 3]),
-            transform_point(self._joints, b, B[:3, 3]),
+            transform_point(self._joints, body, frame[:3, 3], self._ancestor)
+            for body, frame in zip(self.closure.bodies, self.closure.frames, strict=True)
         )
         return subtract(end, start)
 
     def get_axis(self, k: int) -> Vector:
-        """Return axis k of B in the base frame."""
+        """Return axis k of B in the frame of the nearest common ancestor."""
         return transform_direction(
-            self._joints, self.closure.bodies[1], self.closure.frames[1][:3, k]
+            self._joints, self.closure.bodies[1], self.closure.frames[1][:3, k], self._ancestor
         )
 
     def project(self, axes: Sequence[int], vector: Vector) -> list[ca.SX]:
-        """Return the components of a vector along some axes of A."""
+        """Return the components of a vector, given in the frame of the nearest common ancestor, along some axes of A."""
         a, A = self.closure.bodies[0], self.closure.frames[0]
-        return [dot(transform_direction(self._joints, a, A[:3, k]), vector) for k in axes]
+        directions = (transform_direction(self._joints, a, A[:3, k], self._ancestor) for k in axes)
+        return [dot(direction, vector) for direction in directions]
 
     @property
     def tilt(self) -> list[ca.SX]:
