@@ -1,5 +1,7 @@
 """Exported functions, run here: what a controller would call, and how long it takes."""
 
+from __future__ import annotations
+
 import ctypes
 import time
 import warnings
@@ -9,10 +11,11 @@ import numpy as np
 
 from paramreduce_cli.errors import ParamreduceWarning
 from paramreduce_cli.export.code_generation import Exported, make_exported_model
+from paramreduce_cli.export.exported_model import ExportedModel
 from paramreduce_cli.export.languages import languages
 from paramreduce_cli.expressions.compiled import load
 from paramreduce_cli.expressions.functions import Argument
-from paramreduce_cli.records import FloatArray, Model, ReducedModel, Speed
+from paramreduce_cli.records import FloatArray, LoopEvaluation, Model, ReducedModel, Speed
 
 _ROUNDS, _TURNS = 20, 9
 """Evaluations of every state in one go, and how often each model is timed."""
@@ -24,6 +27,66 @@ void repeated(long rounds, long n, const double *phi, const double *const *in, d
       {name}(phi, {arrays});
 }}
 """
+
+
+_LOOPS = """
+void repeated(long rounds, long n, const double *q, const double *z, const double *dz, const double *ddz) {{
+  double guess[{n_q}], R[{n_R}], b[{n_d}], dq[{n_q}], ddq[{n_q}];
+  for (long r = 0; r < rounds; ++r)
+    for (long k = 0; k < n; ++k) {{
+      for (int i = 0; i < {n_q}; ++i) guess[i] = q[k * {n_q} + i];
+      for (int i = 0; i < {n_R}; ++i) R[i] = 0;
+      {name}(z + k * {n_z}, dz + k * {n_z}, ddz + k * {n_z}, 0, guess, R, b, dq, ddq);
+    }}
+}}
+"""
+
+
+def evaluate_loops(
+    model: Model,
+    running: Mapping[str, RunningModel],
+    q: FloatArray,
+    dz: FloatArray,
+    ddz: FloatArray,
+) -> LoopEvaluation:
+    """Count and time what a controller evaluates for closed loops.
+
+    Args:
+        model: Model of the robot.
+        running: Inverse dynamics of some models by name, the full one first.
+        q: Coordinates that close the loops, (n_states, n_q).
+        dz: Velocities of the independent coordinates, (n_states, n_dof).
+        ddz: Accelerations, same shape.
+    """
+    exported = next(iter(running.values())).exported
+    newton, velocities, accelerations, rates = (
+        function.program.n_operations for function in exported.loop_problems
+    )
+    stem, text = _write_source(exported)
+    n_q, n_z = model.mechanism.n_q, model.mechanism.n_dof
+    sizes = {"n_q": n_q, "n_z": n_z, "n_d": n_q - n_z, "n_R": (n_q - n_z) * n_z}
+    library = load(text + _LOOPS.format(name=f"{stem}_states", **sizes))
+    seconds = None
+    if library is not None:
+        z = q[:, list(model.mechanism.independent)]
+        arrays = [np.ascontiguousarray(x) for x in (q, z, dz, ddz)]
+        pointers = [ctypes.c_void_p(x.ctypes.data) for x in arrays]
+        timings = []
+        for _ in range(_TURNS):
+            started = time.perf_counter()
+            library.repeated(ctypes.c_long(_ROUNDS), ctypes.c_long(len(q)), *pointers)
+            timings.append((time.perf_counter() - started) / _ROUNDS / len(q))
+        seconds = min(timings)
+    inverse = {name: one.n_operations for name, one in running.items()}
+    return LoopEvaluation(newton, velocities, accelerations, rates, inverse, seconds)
+
+
+def _write_source(exported: ExportedModel) -> tuple[str, str]:
+    """Return the prefix of the functions' names, and the C source with its header."""
+    files: dict[str, bytes] = languages["c"](exported)
+    stem = next(file[:-2] for file in files if file.endswith(".h"))
+    header, source = (files[f"{stem}.{end}"].decode() for end in ("h", "c"))
+    return stem, header + source.replace(f'#include "{stem}.h"', "")
 
 
 class RunningModel:
@@ -41,12 +104,9 @@ class RunningModel:
         self._phi = np.ascontiguousarray(chosen.values)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", ParamreduceWarning)  # nothing is simulated with it
-            exported = make_exported_model(model, chosen, title="", what=what)
-        files: dict[str, bytes] = languages["c"](exported)
-        (self._function,) = exported.functions
-        stem = next(file[:-2] for file in files if file.endswith(".h"))
-        header, source = (files[f"{stem}.{end}"].decode() for end in ("h", "c"))
-        text = header + source.replace(f'#include "{stem}.h"', "")
+            self.exported = make_exported_model(model, chosen, title="", what=what)
+        (self._function,) = self.exported.functions
+        stem, text = _write_source(self.exported)
         sides = {"in": self._states, "out": self._function.results}
         arrays = (
             f"{s}[{i}] + k * {a.size}" for s, side in sides.items() for i, a in enumerate(side)
@@ -62,6 +122,11 @@ class RunningModel:
     def takes(self) -> list[str]:
         """Names of what it is handed, in their order: of q, dq, ddq, R and b."""
         return [argument.name for argument in self._states]
+
+    @property
+    def n_operations(self) -> int:
+        """Operations of the function."""
+        return self._function.program.n_operations
 
     @property
     def language(self) -> str:

@@ -84,7 +84,7 @@ from paramreduce_cli.records.terms import (
     TermModel,
     TermReduction,
 )
-from paramreduce_cli.records.tracking import Paths, Speed, Tracking
+from paramreduce_cli.records.tracking import LoopEvaluation, Paths, Speed, Tracking
 from paramreduce_cli.records.trajectories import (
     DISTANCES,
     Coefficients,

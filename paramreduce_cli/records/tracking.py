@@ -19,6 +19,29 @@ class Speed:
 
 
 @record
+class LoopEvaluation:
+    """Operations and time of what a controller evaluates for closed loops, besides the torques."""
+
+    newton: int
+    """Operations of one of Newton's corrections of the positions."""
+    velocities: int
+    """Operations of R and all velocities."""
+    accelerations: int
+    """Operations of b and all accelerations, for a known R."""
+    rates: int
+    """Operations of R, b, all velocities and all accelerations at once."""
+    inverse: Mapping[str, int]
+    """Operations of d_z with R handed in, by model, the full one first."""
+    seconds: float | None
+    """Time of one correction and the rates, s; None if it was not measured."""
+
+    @property
+    def whole(self) -> dict[str, int]:
+        """Operations of one correction, the rates and d_z, by model, the full one first."""
+        return {name: self.newton + self.rates + count for name, count in self.inverse.items()}
+
+
+@record
 class Paths:
     """A set of motions at the times of a controller; each rests at its end while others still move.
 

@@ -42,6 +42,8 @@ class Answer:
     """Symbols of the functions whose operations are counted."""
     nanoseconds: tuple[str, str]
     """Times of one evaluation of both functions, beside the full model; empty if they were not measured."""
+    loops: str
+    """Operations and time of the whole evaluation of closed loops; empty without loops."""
     as_identified: bool
     """Whether the values are those of identification, to which held-out errors and deviations belong."""
     weighted: str
@@ -73,6 +75,7 @@ def gather_answer(data: ReportData, options: str) -> Answer:
             _describe_speed(data, data.speed, "d_z with R"),
             _describe_speed(data, data.speed_direct, "[M_zz | δ_z] with R and b"),
         ),
+        loops=_describe_loops(data),
         as_identified=_has_identified_values(data),
         weighted=_WEIGHTED[data.weighting],
         command=export if data.model is not None else f"{export} --format values",
@@ -194,6 +197,22 @@ def _find_worst_joint(data: ReportData) -> str:
 def _format_two_digits(value: float) -> str:
     """Return a number with two digits and without an exponent, like the rating of a motor."""
     return np.format_float_positional(value, precision=2, fractional=False, trim="-")
+
+
+def _describe_loops(data: ReportData) -> str:
+    """Return a sentence on the operations and the time of the whole evaluation of closed loops."""
+    loops = data.loops
+    if loops is None:
+        return ""
+    full, selected = loops.whole.values()
+    timed = ""
+    if loops.seconds is not None and data.speed is not None:
+        whole = [1e9 * (loops.seconds + seconds) for seconds in data.speed.seconds.values()]
+        timed = f"; {whole[1]:.3g} ns instead of {whole[0]:.3g} ns in {data.speed.language}"
+    return (
+        f"operations of the whole evaluation, of {full}: {loops.newton} for one of Newton's corrections, {loops.rates} "
+        f"for all velocities and accelerations with R and b, {selected - loops.newton - loops.rates} for d_z{timed}"
+    )
 
 
 def _describe_speed(data: ReportData, speed: Speed | None, of_loops: str) -> str:

@@ -10,6 +10,7 @@ from paramreduce_cli.records import (
     Block,
     CountedDynamics,
     FloatArray,
+    LoopEvaluation,
     Model,
     ReducedModel,
     Samples,
@@ -70,6 +71,8 @@ class ReportData(Artifacts):
     """Speed of the inverse dynamics of the full and of the selected model; None without a robot."""
     speed_direct: Speed | None
     """Speed of the direct dynamics of the full and of the selected model; None without a robot."""
+    loops: LoopEvaluation | None
+    """Operations and time of the kinematics of closed loops; None without loops."""
     tracking: Tracking | None
     """Simulated control; None if it was not requested."""
 

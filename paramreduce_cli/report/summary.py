@@ -16,6 +16,7 @@ from paramreduce_cli.records import (
     IntArray,
     JointErrors,
     Leanest,
+    LoopEvaluation,
     Model,
     ModelChoice,
     Provenance,
@@ -32,10 +33,19 @@ from paramreduce_cli.records import (
 
 
 def gather_summary(
-    artifacts: Artifacts, leanest: Mapping[str, Leanest], provenance: Provenance
+    artifacts: Artifacts,
+    leanest: Mapping[str, Leanest],
+    loops: LoopEvaluation | None,
+    provenance: Provenance,
 ) -> dict[str, Any]:
     """Gather the numbers of all artifacts as plain data; infinite numbers become None, and so do those of a mechanism
     if there is none.
+
+    Args:
+        artifacts: Artifacts of all stages.
+        leanest: The leanest models within the limits, by function.
+        loops: Operations of the kinematics of closed loops; None without loops.
+        provenance: Origin of the artifacts.
     """
     model, reduction, validation = artifacts.model, artifacts.reduction, artifacts.validation
     selected = validation.selected
@@ -62,6 +72,7 @@ def gather_summary(
             name: _summarise_rows(result) for name, result in validation.heuristics.items()
         },
         "full": dict(validation.full),
+        "loops": _summarise_loops(loops),
         "identification": _summarise_identification(artifacts.identification),
         "terms": _summarise_terms(model, artifacts.terms),
         "selected": {
@@ -80,6 +91,23 @@ def gather_summary(
     }
     plain: dict[str, Any] = _convert(data)
     return plain
+
+
+def _summarise_loops(loops: LoopEvaluation | None) -> dict[str, Any] | None:
+    """Return the operations of the kinematics of closed loops, and of the whole evaluation of the full and of the
+    selected model; None without loops.
+    """
+    if loops is None:
+        return None
+    full, selected = loops.whole.values()
+    return {
+        "newton": loops.newton,
+        "velocities": loops.velocities,
+        "accelerations": loops.accelerations,
+        "rates": loops.rates,
+        "whole_full": full,
+        "whole_selected": selected,
+    }
 
 
 def _summarise_leanest(leanest: Mapping[str, Leanest]) -> dict[str, Any]:

@@ -16,7 +16,7 @@ from paramreduce_cli.errors import ConfigError, DataError, FormulationError, Par
 from paramreduce_cli.export.code_generation import Exported, make_exported_model
 from paramreduce_cli.export.languages import languages
 from paramreduce_cli.export.named_models import find_chosen_model
-from paramreduce_cli.export.running import RunningModel, measure_speeds
+from paramreduce_cli.export.running import RunningModel, evaluate_loops, measure_speeds
 from paramreduce_cli.fields.section import expand_per_joint
 from paramreduce_cli.judgement.leanest import find_leanest
 from paramreduce_cli.judgement.verdict import find_unsafe_models
@@ -26,6 +26,7 @@ from paramreduce_cli.records import (
     Artifacts,
     CountedDynamics,
     FloatArray,
+    LoopEvaluation,
     Model,
     Progress,
     Provenance,
@@ -102,6 +103,7 @@ def report(
         unsafe=bool(find_unsafe_models(validation.full, judged)[judged.find_row(selected.n)]),
         speed=measure_speeds(running, states) if running else None,
         speed_direct=measure_speeds(direct, states) if direct else None,
+        loops=_evaluate_loops(model, running, motion),
         tracking=_simulate_tracking(section, model, running, motion),
     )
     lean = {
@@ -109,7 +111,7 @@ def report(
         for name in (("inverse", "direct") if model is not None else ())
         if (found := find_leanest(name, limits, validation.heuristics, artifacts.terms)) is not None
     }
-    summary = gather_summary(artifacts, lean, provenance)
+    summary = gather_summary(artifacts, lean, data.loops, provenance)
     formats = [str(name) for name in section.formats]
     drawn = [name for name, _ in _list_shown(figures, model)]
 
@@ -176,6 +178,15 @@ def _compute_states(model: Model, motion: ShownMotion) -> dict[str, FloatArray]:
     R = coordinates.compute_tangent(motion.q)[:, dependent]
     b = coordinates.compute_rates(motion.q, motion.dz, np.zeros_like(motion.ddz))[1][:, dependent]
     return {"q": motion.q, "dq": dq, "ddq": ddq, "R": R, "b": b}
+
+
+def _evaluate_loops(
+    model: Model | None, running: Mapping[str, RunningModel], motion: ShownMotion
+) -> LoopEvaluation | None:
+    """Return the operations and the time of the kinematics of loops, or None without loops."""
+    if model is None or model.mechanism.loops is None or not running:
+        return None
+    return evaluate_loops(model, running, motion.q, motion.dz, motion.ddz)
 
 
 def _simulate_tracking(
