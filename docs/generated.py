@@ -162,8 +162,9 @@ def _sections(schema: Schema) -> Iterator[tuple[str, Schema, str]]:
             for name, many in _references(entry):
                 if name not in seen:
                     seen.add(name)
-                    place = f"{path}.{key}" if path else key
-                    waiting.append((place + many, schema["$defs"][name]))
+                    place, section_below = f"{path}.{key}" if path else key, schema["$defs"][name]
+                    kind = section_below.get("properties", {}).get("type", {}).get("const")
+                    waiting.append((place + many + (f"[{kind}]" if kind else ""), section_below))
 
 
 def _references(entry: Any, many: str = "") -> Iterator[tuple[str, str]]:
@@ -176,7 +177,7 @@ def _references(entry: Any, many: str = "") -> Iterator[tuple[str, str]]:
             yield entry["$ref"].rpartition("/")[2], many
         for key, below in entry.items():
             step = {"items": "[]", "additionalProperties": ".NAME"}.get(key, "")
-            if isinstance(below, dict | list):
+            if isinstance(below, dict | list) and key != "discriminator":
                 yield from _references(below, many + step)
 
 
@@ -190,6 +191,8 @@ def _kind(entry: Schema, schema: Schema) -> str:
         return "one of " + ", ".join(f"`{value}`" for value in entry["enum"])
     if "const" in entry:
         return f"`{entry['const']}`"
+    if "oneOf" in entry:
+        return "a section"
     if "anyOf" in entry:
         kinds = [_kind(one, schema) for one in entry["anyOf"] if one.get("type") != "null"]
         numeric = {"a number", "a whole number"} & set(kinds)
@@ -248,6 +251,8 @@ def _examples() -> dict[str, str]:
 
     def walk(value: Any, places: set[str]) -> None:
         if isinstance(value, dict):
+            if isinstance(value.get("type"), str):
+                places = places | {f"{place}[{value['type']}]" for place in places}
             for key, below in value.items():
                 walk(below, {f"{p}.{k}".lstrip(".") for p in places for k in (key, "NAME")})
         elif isinstance(value, list) and value and isinstance(value[0], dict):

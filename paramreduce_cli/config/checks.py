@@ -78,6 +78,16 @@ def _check_payloads_and_drives(config: Config) -> Iterator[Problem]:
         config.drives, bodies.list_coordinates(), closed=bodies.closed
     ):
         yield ("drives", *key), message
+    coordinates = bodies.list_coordinates()
+    owners = [*bodies.list_body_names(), *config.payloads, *config.list_drives()]
+    for name, section in config.forces.items():
+        if name in owners:
+            yield (
+                ("forces", name),
+                f"{name!r} is taken by a body, payload or drive; use another name",
+            )
+        for key, message in section.find_problems(["base", *bodies.list_body_names()], coordinates):
+            yield ("forces", name, *key), message
     for name, drive in config.drives.items():
         if drive.friction == "auto" and config.sampling.log is None:
             yield (
@@ -449,7 +459,8 @@ def _warn_of_drives(config: Config) -> Iterator[str]:
     negative.
     """
     sampling = config.sampling
-    missing = {name: drive.list_unknown() for name, drive in config.list_drives().items()}
+    elements = {**config.list_drives(), **config.forces}
+    missing = {name: element.list_unknown() for name, element in elements.items()}
     found = [f"{' and '.join(keys)} of {name}" for name, keys in missing.items() if keys]
     if found and not sampling.measured:
         yield f"unknown, and so zero in the torques of the model: {', '.join(found)}"

@@ -33,6 +33,7 @@ from paramreduce_cli.identification.state_estimation import (
     estimate_states,
 )
 from paramreduce_cli.multibody.drive_dynamics import OddFunctions, express_unit_force
+from paramreduce_cli.multibody.drive_motions import express_weighted_sum
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.records import (
     INERTIAL,
@@ -324,9 +325,11 @@ def _compute_friction(
     speeds, loads = [rest] * drive.weights.size, [rest] * drive.weights.size
     for j, k in enumerate(independent):
         speeds[k], loads[k] = dz[:, j], gravity[:, j]
-    states: tuple[list[FloatArray], ...] = ([], speeds, [], loads)
+    motion = express_weighted_sum(
+        drive, ([rest] * drive.weights.size, speeds, [rest] * drive.weights.size)
+    )
     columns = [
-        express_unit_force(c.kind, replace(drive, smoothing=c.speed), states, _NUMPY)
+        express_unit_force(c.kind, replace(drive, smoothing=c.speed), motion, loads, _NUMPY)
         for c in candidates
     ]
     return np.stack(columns, axis=1)[:, None, :] * drive.weights[list(independent)][:, None]

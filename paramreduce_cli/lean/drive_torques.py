@@ -1,11 +1,12 @@
 """What drives add to lean models; no choice at a joint changes it."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from paramreduce_cli.lean.algebra import Scalar
-from paramreduce_cli.lean.joint_frames import Tree
+from paramreduce_cli.lean.joint_frames import Tree, TreeDrive
 from paramreduce_cli.lean.joint_states import Symbols
 from paramreduce_cli.multibody.drive_dynamics import OddFunctions, express_unit_force
+from paramreduce_cli.multibody.drive_motions import DriveMotion, express_weighted_sum, split_motion
 from paramreduce_cli.records import Kind
 
 _SCALARS = OddFunctions(Scalar.sign, Scalar.take_tanh)
@@ -25,29 +26,41 @@ def add_drives(
     """
     joints = range(len(tree.joints))
     states = [[symbols.read_coordinate(i, derivative) for i in joints] for derivative in range(3)]
-    states.append(gravity)
     result = list(torques)
-    for drive, columns in tree.drives:
+    for element in tree.drives:
+        motion = _build_motion(element, symbols, states)
         force = symbols.make_constant(0.0)
-        for kind, position in columns.items():
+        for kind, position in element.columns.items():
             if (moving or kind is not Kind.ROTOR) and (gravity or kind is not Kind.LOAD):
-                unit = express_unit_force(kind, drive, states, _SCALARS)
+                unit = express_unit_force(kind, element.drive, motion, gravity, _SCALARS)
                 force = force + symbols.read_parameter(position) * unit
-        for i, weight in _iterate_weights(drive.weights.tolist()):
-            result[i] = result[i] + weight * force
+        for i, weight in enumerate(motion.weights):
+            if weight:
+                result[i] = result[i] + weight * force
     return result
+
+
+def _build_motion(
+    element: TreeDrive, symbols: Symbols, states: Sequence[Sequence[Scalar]]
+) -> DriveMotion:
+    """Return the motion that a drive acts along."""
+    if element.motion is None:
+        return express_weighted_sum(element.drive, states)
+    inputs = [*states[0], *states[1]]
+    values = element.motion.rebuild(symbols.graph, lambda position: inputs[position].value)
+    return split_motion([Scalar(symbols.graph, value) for value in values])
 
 
 def add_rotors(tree: Tree, symbols: Symbols, M: list[list[Scalar]]) -> list[list[Scalar]]:
     """Return the lower triangle of the mass matrix with the rotors of drives added."""
     result = [list(row) for row in M]
-    for drive, columns in tree.drives:
-        if Kind.ROTOR in columns:
-            inertia = symbols.read_parameter(columns[Kind.ROTOR])
-            weights = drive.weights.tolist()
-            for i, one in _iterate_weights(weights):
-                for j, other in _iterate_weights(weights[: i + 1]):
-                    result[i][j] = result[i][j] + one * other * inertia
+    for element in tree.drives:
+        if Kind.ROTOR in element.columns:
+            inertia = symbols.read_parameter(element.columns[Kind.ROTOR])
+            weights = element.drive.weights.tolist()
+            for i, first in _iterate_weights(weights):
+                for j, second in _iterate_weights(weights[: i + 1]):
+                    result[i][j] = result[i][j] + first * second * inertia
     return result
 
 

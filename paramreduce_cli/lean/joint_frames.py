@@ -11,6 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from paramreduce_cli.expressions.programs import Program
+from paramreduce_cli.multibody.drive_motions import make_motion_function
 from paramreduce_cli.records import BASE, Drive, FloatArray, Kind, Mechanism, Rigid
 from paramreduce_cli.robots.frames import clean_rotation
 
@@ -46,6 +48,17 @@ class Joint:
 
 
 @dataclass(frozen=True)
+class TreeDrive:
+    """A drive or force element of a tree."""
+
+    drive: Drive
+    columns: Mapping[Kind, int]
+    """Positions of its parameters among the inputs of all models, by kind."""
+    motion: Program | None
+    """Program from q and dq to the motion between two frames; None for a weighted sum of coordinates."""
+
+
+@dataclass(frozen=True)
 class Tree:
     """The joints of a mechanism's tree, parents before their children, in the order of the bodies."""
 
@@ -56,8 +69,8 @@ class Tree:
     """Number of parameters of all bodies."""
     carried: bool = False
     """Whether it is a part of a larger tree, whose motion carries it: the base moves."""
-    drives: tuple[tuple[Drive, Mapping[Kind, int]], ...] = ()
-    """Drives with the positions of their parameters; a part of a tree has none."""
+    drives: tuple[TreeDrive, ...] = ()
+    """Drives and force elements; a part of a tree has none."""
     nominal: FloatArray | None = None
     """Nominal values of the parameters, (n_parameters,), if friction depends on the load."""
 
@@ -96,7 +109,12 @@ def choose_frames(mechanism: Mechanism) -> Tree:
                 rigid=mechanism.list_rigid_parts(i),
             )
         )
-    drives = tuple((drive, mechanism.find_drive_columns(drive)) for drive in mechanism.drives)
+    drives = tuple(
+        TreeDrive(
+            drive, mechanism.find_drive_columns(drive), _make_motion_program(mechanism, drive)
+        )
+        for drive in mechanism.drives
+    )
     return Tree(
         tuple(joints),
         mechanism.gravity,
@@ -104,6 +122,13 @@ def choose_frames(mechanism: Mechanism) -> Tree:
         drives=drives,
         nominal=mechanism.nominal,
     )
+
+
+def _make_motion_program(mechanism: Mechanism, drive: Drive) -> Program | None:
+    """Return the program of a motion between two frames, or None for a weighted sum of coordinates."""
+    if drive.between is None:
+        return None
+    return Program.from_function(make_motion_function(mechanism, drive.between))
 
 
 def _has_tilt(rotation: FloatArray) -> bool:

@@ -42,7 +42,7 @@ def _build_nominal_gravity(
     tree: Tree, choices: Sequence[JointFormulation], graph: Graph, dropped: Collection[int]
 ) -> list[Scalar]:
     """Return the nominal torques of gravity, (n_q,); an empty list if no parameter that is kept needs them."""
-    loads = [columns[Kind.LOAD] for _, columns in tree.drives if Kind.LOAD in columns]
+    loads = [drive.columns[Kind.LOAD] for drive in tree.drives if Kind.LOAD in drive.columns]
     if tree.nominal is None or all(position in dropped for position in loads):
         return []
     symbols = RestSymbols(graph, tree, tree.nominal)

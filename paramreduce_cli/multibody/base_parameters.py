@@ -58,7 +58,7 @@ def find_affecting_parameters(mechanism: Mechanism, K: FloatArray) -> BoolArray:
         largest = np.max(norms[:, inertial] / units, axis=1, keepdims=True)
         scale[:, inertial] = largest * units
     for drive in mechanism.drives:
-        weight = float(np.abs(drive.weights).max())
+        weight = float(np.abs(drive.weights).max()) or 1.0
         for kind, column in mechanism.find_drive_columns(drive).items():
             forces = weight if kind.order is not None else 1.0
             scale[:, column] = np.sqrt(len(K)) * weight * forces

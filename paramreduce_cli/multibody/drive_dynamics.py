@@ -1,8 +1,7 @@
 """Torques of drives: inertia of rotors, friction, constant forces and springs.
 
-A drive acts along one motion, whose position, speed and acceleration are those of the coordinates
-summed with its weights; a force f along it is weight times f on each coordinate, by virtual work.
-The formulas serve CasADi's scalars and those of expression graphs alike.
+A drive or force element acts along one motion; a force f along it is f times the derivative of its speed by each
+coordinate's speed, by virtual work. The formulas serve CasADi's scalars and those of expression graphs alike.
 """
 
 from collections.abc import Callable, Sequence
@@ -12,6 +11,7 @@ from typing import Any, NamedTuple
 import casadi as ca
 import numpy as np
 
+from paramreduce_cli.multibody.drive_motions import DriveMotion, sum_weighted
 from paramreduce_cli.records import SIGN_FRICTION, Drive, FloatArray, Kind, Mechanism
 
 
@@ -30,51 +30,78 @@ CASADI = OddFunctions(ca.sign, ca.tanh)
 
 
 def express_unit_force(
-    kind: Kind, drive: Drive, states: Sequence[Sequence[Any]], odd: OddFunctions
+    kind: Kind, drive: Drive, motion: DriveMotion, gravity: Sequence[Any], odd: OddFunctions
 ) -> Any:
     """Return the force along a drive's motion for a unit value of one of its parameters.
 
     Args:
         kind: Kind of the parameter, one of :data:`paramreduce_cli.records.DRIVE`.
         drive: The drive.
-        states: Generalised coordinates q, velocities dq, accelerations ddq and nominal torques of gravity, (n_q,) each.
+        motion: State of the motion that it acts along.
+        gravity: Nominal torques of gravity, (n_q,); used for friction that depends on the load alone.
         odd: Functions of these scalars.
 
     Raises:
         ValueError: The parameter is none of a drive.
     """
-    if kind not in _FORCES:
+    if kind not in (*_FORCES, Kind.LOAD):
         raise ValueError(f"{kind} is no parameter of a drive")
-    return _FORCES[kind](drive, states, odd)
+    if kind is Kind.LOAD:
+        return _express_load_friction(drive, motion, gravity, odd)
+    return _FORCES[kind](drive, motion, odd)
 
 
-def _express_friction_sign(drive: Drive, states: Sequence[Sequence[Any]], odd: OddFunctions) -> Any:
+def _express_friction_sign(drive: Drive, motion: DriveMotion, odd: OddFunctions) -> Any:
     """Return the sign of a drive's speed, smoothed by a hyperbolic tangent if the drive asks for it."""
-    speed = sum_along(drive, states[1])
+    speed = motion.speed
     return odd.tanh(speed * (1 / drive.smoothing)) if drive.smoothing else odd.sign(speed)
 
 
-def _express_stribeck(drive: Drive, states: Sequence[Sequence[Any]], odd: OddFunctions) -> Any:
+def _express_stribeck(drive: Drive, motion: DriveMotion, odd: OddFunctions) -> Any:
     """Return the factor of friction that is large at low speed and fades, a difference of two signs [Makkar2005]."""
-    speed = sum_along(drive, states[1])
-    return _express_friction_sign(drive, states, odd) - odd.tanh(
-        speed * (1 / drive.stribeck_velocity)
+    return _express_friction_sign(drive, motion, odd) - odd.tanh(
+        motion.speed * (1 / drive.stribeck_velocity)
     )
 
 
-def _express_magnitude(drive: Drive, states: Sequence[Sequence[Any]], odd: OddFunctions) -> Any:
-    """Return the magnitude of a drive's speed."""
-    speed = sum_along(drive, states[1])
-    return speed * odd.sign(speed)
+def _express_magnitude(value: Any, odd: OddFunctions) -> Any:
+    """Return the magnitude of a value."""
+    return value * odd.sign(value)
 
 
-def _express_load_friction(drive: Drive, states: Sequence[Sequence[Any]], odd: OddFunctions) -> Any:
+def _interpolate_table(table: FloatArray | None, value: Any, odd: OddFunctions) -> Any:
+    """Return the force of a piecewise linear table, which goes on straight beyond its ends.
+
+    Every change of slope is half of it times the distance from the point, so that magnitudes are all that is needed.
+
+    Args:
+        table: Arguments, ascending, and forces, (n_points, 2).
+        value: Argument.
+        odd: Functions of these scalars.
+    """
+    assert table is not None
+    x, y = table.T
+    slopes = np.diff(y) / np.diff(x)
+    kinks = np.diff(slopes) / 2
+    middle = (slopes[0] + slopes[-1]) / 2
+    constant = y[0] - middle * x[0] - float(kinks @ np.abs(x[0] - x[1:-1]))
+    force = float(middle) * value + float(constant)
+    for at, kink in zip(x[1:-1].tolist(), kinks.tolist(), strict=True):
+        if kink:
+            force = force + kink * _express_magnitude(value + -at, odd)
+    return force
+
+
+def _express_load_friction(
+    drive: Drive, motion: DriveMotion, gravity: Sequence[Any], odd: OddFunctions
+) -> Any:
     """Return the factor of friction that grows with the load, the nominal force of gravity along the motion [Hamon2010].
 
     Of the forces along a motion of several coordinates that explain their torques, the least-squares one is taken.
     """
-    load = sum_along(drive, states[3]) * (1 / float(drive.weights @ drive.weights))
-    return load * odd.sign(load) * _express_friction_sign(drive, states, odd)
+    along = sum_weighted(drive.weights.tolist(), gravity)
+    load = along * (1 / float(drive.weights @ drive.weights))
+    return _express_magnitude(load, odd) * _express_friction_sign(drive, motion, odd)
 
 
 def smooth_friction(mechanism: Mechanism, speeds: FloatArray) -> Mechanism:
@@ -83,7 +110,8 @@ def smooth_friction(mechanism: Mechanism, speeds: FloatArray) -> Mechanism:
 
     Args:
         mechanism: The mechanism.
-        speeds: Largest speeds of the independent coordinates, (n_dof,), rad/s or m/s.
+        speeds: Largest speeds of the independent coordinates, (n_dof,), rad/s or m/s; motions between frames are taken to be as
+            fast as the fastest of them.
     """
     if all(parameter.kind not in SIGN_FRICTION for parameter in mechanism.parameters):
         return mechanism
@@ -91,29 +119,32 @@ def smooth_friction(mechanism: Mechanism, speeds: FloatArray) -> Mechanism:
     fastest[list(mechanism.independent)] = speeds
     drives = tuple(
         replace(
-            drive, smoothing=max(drive.smoothing, _ROUNDED * float(abs(drive.weights) @ fastest))
+            drive,
+            smoothing=max(
+                drive.smoothing,
+                _ROUNDED * (float(abs(drive.weights) @ fastest) or float(speeds.max())),
+            ),
         )
         for drive in mechanism.drives
     )
     return replace(mechanism, drives=drives)
 
 
-def sum_along(drive: Drive, values: Sequence[Any]) -> Any:
-    """Return the sum of coordinates, or of their derivatives, with the drive's weights."""
-    return sum(weight * values[i] for i, weight in enumerate(drive.weights.tolist()) if weight)
-
-
-_FORCES: dict[Kind, Callable[[Drive, Sequence[Sequence[Any]], OddFunctions], Any]] = {
-    Kind.ROTOR: lambda drive, states, odd: sum_along(drive, states[2]),
-    Kind.VISCOUS: lambda drive, states, odd: sum_along(drive, states[1]),
+_FORCES: dict[Kind, Callable[[Drive, DriveMotion, OddFunctions], Any]] = {
+    Kind.ROTOR: lambda drive, motion, odd: motion.acceleration,
+    Kind.VISCOUS: lambda drive, motion, odd: motion.speed,
     Kind.COULOMB: _express_friction_sign,
-    Kind.OFFSET: lambda drive, states, odd: 1.0,
-    Kind.STIFFNESS: lambda drive, states, odd: sum_along(drive, states[0]) - drive.rest,
+    Kind.OFFSET: lambda drive, motion, odd: 1.0,
+    Kind.STIFFNESS: lambda drive, motion, odd: motion.position - drive.rest,
     Kind.STRIBECK: _express_stribeck,
-    Kind.ASYMMETRY: lambda drive, states, odd: _express_magnitude(drive, states, odd),
-    Kind.QUADRATIC: lambda drive, states, odd: (
-        sum_along(drive, states[1]) * _express_magnitude(drive, states, odd)
+    Kind.ASYMMETRY: lambda drive, motion, odd: _express_magnitude(motion.speed, odd),
+    Kind.QUADRATIC: lambda drive, motion, odd: motion.speed * _express_magnitude(motion.speed, odd),
+    Kind.SPRING_TABLE: lambda drive, motion, odd: _interpolate_table(
+        drive.spring_table, motion.position - drive.rest, odd
     ),
-    Kind.LOAD: _express_load_friction,
+    Kind.DAMPER_TABLE: lambda drive, motion, odd: _interpolate_table(
+        drive.damper_table, motion.speed, odd
+    ),
+    Kind.CREEP: lambda drive, motion, odd: motion.creepage,
 }
-"""Force along a drive's motion for a unit value of each parameter; states are q, dq, ddq and torques of gravity."""
+"""Force along a drive's motion for a unit value of each parameter, but for friction that depends on the load."""

@@ -11,6 +11,11 @@ import casadi as ca
 
 from paramreduce_cli.expressions.vectors import Matrix, Vector, add, apply, cross, dot, scale
 from paramreduce_cli.multibody.drive_dynamics import CASADI, express_unit_force
+from paramreduce_cli.multibody.drive_motions import (
+    express_weighted_sum,
+    make_motion_function,
+    split_motion,
+)
 from paramreduce_cli.multibody.kinematics import JointMotion, make_joint_motions
 from paramreduce_cli.records import BASE, INERTIAL, Mechanism, Rigid
 
@@ -51,11 +56,16 @@ def express_torques(
     """
     tau = _express_body_torques(mechanism, q, dq, ddq, phi)
     vectors = (q, dq, ddq, express_nominal_gravity(mechanism, q))
-    states = [[x[i] for i in range(mechanism.n_q)] for x in vectors]
+    *states, gravity = [[x[i] for i in range(mechanism.n_q)] for x in vectors]
     for drive in mechanism.drives:
+        motion = express_weighted_sum(drive, states)
+        if drive.between is not None:
+            motion = split_motion(
+                ca.vertsplit(make_motion_function(mechanism, drive.between)(q, dq))
+            )
         for kind, column in mechanism.find_drive_columns(drive).items():
-            along = phi[column] * express_unit_force(kind, drive, states, CASADI)
-            tau = [t + weight * along for t, weight in zip(tau, drive.weights, strict=True)]
+            along = phi[column] * express_unit_force(kind, drive, motion, gravity, CASADI)
+            tau = [t + weight * along for t, weight in zip(tau, motion.weights, strict=True)]
     return tau
 
 

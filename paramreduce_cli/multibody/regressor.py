@@ -12,6 +12,11 @@ import casadi as ca
 import numpy as np
 
 from paramreduce_cli.multibody.drive_dynamics import CASADI, express_unit_force
+from paramreduce_cli.multibody.drive_motions import (
+    express_weighted_sum,
+    make_motion_function,
+    split_motion,
+)
 from paramreduce_cli.multibody.inverse_dynamics import express_nominal_gravity
 from paramreduce_cli.multibody.kinematics import express_cosine_and_sine
 from paramreduce_cli.records import BASE, INERTIAL, Body, FloatArray, Mechanism
@@ -64,12 +69,18 @@ def _express_drive_rows(mechanism: Mechanism, q: ca.MX, dq: ca.MX, ddq: ca.MX) -
     """Return the rows of the drives' parameters, (1, n_q) each, by column."""
     at = ca.SX.sym("q", mechanism.n_q)
     gravity = ca.Function("gravity", [at], [express_nominal_gravity(mechanism, at)])(q)
-    vectors = [[x[i] for i in range(mechanism.n_q)] for x in (q, dq, ddq, gravity)]
+    *states, loads = [[x[i] for i in range(mechanism.n_q)] for x in (q, dq, ddq, gravity)]
     rows = {}
     for drive in mechanism.drives:
+        motion = express_weighted_sum(drive, states)
         weights = ca.MX(ca.sparsify(ca.DM(drive.weights[None])))
+        if drive.between is not None:
+            motion = split_motion(
+                ca.vertsplit(make_motion_function(mechanism, drive.between)(q, dq))
+            )
+            weights = ca.horzcat(*motion.weights)
         for kind, column in mechanism.find_drive_columns(drive).items():
-            rows[column] = express_unit_force(kind, drive, vectors, CASADI) * weights
+            rows[column] = express_unit_force(kind, drive, motion, loads, CASADI) * weights
     return rows
 
 

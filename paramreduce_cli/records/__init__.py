@@ -32,6 +32,8 @@ from paramreduce_cli.records.mechanism import (
     Length,
     Loops,
     Mechanism,
+    MotionBetween,
+    MotionKind,
     Payload,
     Rigid,
 )

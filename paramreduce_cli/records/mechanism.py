@@ -119,23 +119,63 @@ class Payload:
     """Homogeneous transform of its frame in the body's, (4, 4), m."""
 
 
+MotionKind = Literal["distance", "shift", "turn", "slip", "sideslip"]
+
+
+@record
+class MotionBetween:
+    """A motion between a frame A on one body and a frame B on another.
+
+    * ``distance``: the distance between the origins;
+    * ``shift``: the component along an axis of A of the vector from A to B, m;
+    * ``turn``: the component along an axis of A of the small rotation of B against A, the sine of its angle;
+    * ``slip``: the velocity of a wheel's contact point along the direction in which the wheel rolls, less radius times spin;
+    * ``sideslip``: the velocity of the contact point across this direction.
+
+    For slips, B is the centre of the wheel with y along its axle, on a body that does not spin. The z axis of A is normal to
+    the road. The creepage is the velocity over the speed of the contact point along the rolling direction.
+    """
+
+    kind: MotionKind
+    bodies: tuple[int, int]
+    """Indices of the two bodies, :data:`BASE` for the base."""
+    frames: tuple[FloatArray, FloatArray]
+    """Homogeneous transforms of A and B in the frames of their bodies, (4, 4), m."""
+    axis: int = 0
+    """Axis of A for a shift or a turn: 0, 1 or 2."""
+    radius: float = 0.0
+    """Radius of a wheel, m."""
+    spin: int = -1
+    """Index of the coordinate that the wheel spins by, about y of B; -1 without one."""
+    low_speed: float = 0.0
+    """Speed v0 that creepages are divided by at rest: the divisor is sqrt(v^2 + v0^2), m/s."""
+
+
 @record
 class Drive:
-    """A drive: rotor, friction, constant force and spring along one motion.
+    """A drive or force element: rotor, friction, constant force, spring, damper or creep along one motion.
 
-    The speed of the motion is a weighted sum of the coordinates' speeds, and a force f along the motion is weight times
-    f on each coordinate, so that power is force times speed.
+    The motion is that of ``between``, or its speed is a weighted sum of the coordinates' speeds. A force f along the motion
+    is f times the derivative of its speed by each coordinate's speed, so that power is force times speed.
     """
 
     name: str
     weights: FloatArray
-    """Weights of the generalised coordinates, (n_q,)."""
+    """Weights of the generalised coordinates, (n_q,); zeros for a motion between frames."""
     smoothing: float = 0.0
     """Speed s at which Coulomb friction, tanh(speed / s), is 76 %; zero for the sign of the speed."""
     rest: float = 0.0
     """Position where the spring is slack, rad or m."""
     stribeck_velocity: float = 0.1
     """Speed s beyond which the Stribeck friction, which has the factor sign(speed) - tanh(speed / s), fades."""
+    spring_table: FloatArray | None = None
+    """Positions less ``rest``, ascending, and forces of a piecewise linear spring, (n_points, 2)."""
+    damper_table: FloatArray | None = None
+    """Speeds and forces of a piecewise linear damper, (n_points, 2), speeds ascending."""
+    creepage: FloatArray | None = None
+    """Weights of the coordinates and of their speeds in the creepage of a linear contact, (2, n_q)."""
+    between: MotionBetween | None = None
+    """Motion between two frames; None for a weighted sum of coordinates."""
 
 
 @record

@@ -39,6 +39,9 @@ class Kind(Enum):
     ASYMMETRY = ("fa", "N m s/rad", 16, "f", "a", "asymmetry", "N s/m", None)
     QUADRATIC = ("fq", "N m s^2/rad^2", 17, "f", "q", "quadratic", "N s^2/m^2", None)
     LOAD = ("fl", "", 18, "f", "l", "load", "", None)
+    SPRING_TABLE = ("ks", "", 19, "k", "s", "spring_table", "", None)
+    DAMPER_TABLE = ("fd", "", 20, "f", "d", "damper_table", "", None)
+    CREEP = ("C", "N m", 21, "C", "", "creep", "N", None)
 
     def __init__(
         self, symbol: str, unit: str, preference: int, letter: str, axes: str,
@@ -80,7 +83,7 @@ INERTIAL = (
 """The standard parameters of a rigid body about its frame's origin: mass, first moments, inertia."""
 
 DRIVE = tuple(kind for kind in Kind if kind.key)
-"""What a drive adds to the torques: inertia of its rotor, friction, a constant, a spring."""
+"""What a drive or force element adds to the torques: inertia of a rotor, friction, a constant, springs, dampers, creep."""
 
 SIGN_FRICTION = (Kind.COULOMB, Kind.STRIBECK, Kind.LOAD)
 """Friction that has the sign of the speed as a factor."""

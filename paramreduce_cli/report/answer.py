@@ -150,6 +150,9 @@ _KINDS = {
     "fa": "asymmetric viscous friction",
     "fq": "quadratic friction",
     "fl": "load-dependent friction",
+    "ks": "factor of a spring's table",
+    "fd": "factor of a damper's table",
+    "C": "force per creepage or slip",
 }
 """What letters stand for, by those that are explained together."""
 

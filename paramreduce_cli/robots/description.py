@@ -18,6 +18,7 @@ from paramreduce_cli.fields.section import (
     expand_per_joint,
 )
 from paramreduce_cli.records import (
+    BASE,
     INERTIAL,
     BoolArray,
     FloatArray,
@@ -29,6 +30,7 @@ from paramreduce_cli.records import (
 from paramreduce_cli.robots.bodies import BodiesDescription
 from paramreduce_cli.robots.dh import DHDescription
 from paramreduce_cli.robots.drives import DriveSection, merge_drives
+from paramreduce_cli.robots.forces import ForceAlong, ForceSection, Names
 from paramreduce_cli.robots.inertia import BodyParameters
 from paramreduce_cli.robots.payloads import PayloadSection
 from paramreduce_cli.robots.tree import TreeDescription
@@ -84,6 +86,8 @@ class Robot(Section):
     """Payloads of the bodies, by name; the parameters of a payload have its name."""
     drives: dict[Name, DriveSection] = {}
     """Rotors, friction and springs by coordinate, by a name of one's own with a motion, or under `all` for every driven coordinate."""
+    forces: dict[Name, ForceSection] = {}
+    """Springs, dampers, bushings, tyres and contacts between bodies, by name; their parameters have this name."""
     nominal_torque: PositivePerJoint | Literal["standard-deviation"] = "standard-deviation"
     """Characteristic torques, one for all joints or a list, N m (N if prismatic); or their standard deviation over the estimation set."""
 
@@ -115,8 +119,9 @@ class Robot(Section):
             table=bodies.build_table(),
             loops=bodies.build_loops(),
             payloads=tuple(s.build_payload(name, index) for name, s in self.payloads.items()),
-            drives=tuple(
-                s.build_drive(name, coordinates) for name, s in self.list_drives().items()
+            drives=(
+                *(s.build_drive(name, coordinates) for name, s in self.list_drives().items()),
+                *(force.drive for force in self.list_forces()),
             ),
             frames=bodies.frames,
             nominal=self._get_nominal(parameters),
@@ -139,6 +144,19 @@ class Robot(Section):
     def list_drives(self) -> dict[str, DriveSection]:
         """Return all drives by name."""
         return merge_drives(self.drives, self.description.bodies.list_driven_coordinates())
+
+    def list_forces(self) -> list[ForceAlong]:
+        """Return the forces of all force elements, each along one motion."""
+        bodies = self.description.bodies
+        rigid = bodies.build_bodies()
+        index = {"base": BASE} | {body.name: k for k, body in enumerate(rigid)}
+        slides = frozenset(body.coordinate for body in rigid if body.joint == "prismatic")
+        names = Names(index, bodies.list_coordinates(), slides)
+        return [
+            force
+            for name, section in self.forces.items()
+            for force in section.build_forces(name, names)
+        ]
 
     @property
     def automatic_friction(self) -> list[str]:
@@ -166,6 +184,11 @@ class Robot(Section):
                 for name, section in self.list_drives().items()
                 for kind in section.get_values()
             ),
+            *(
+                Parameter(kind, force.drive.name, force.sliding)
+                for force in self.list_forces()
+                for kind in force.values
+            ),
         )
 
     def get_body_parameters(self) -> dict[str, BodyParameters]:
@@ -178,7 +201,8 @@ class Robot(Section):
         """Return the values of all parameters, (n_parameters,), SI."""
         rigid = [body.get_values() for body in self.get_body_parameters().values()]
         driven = [drive.get_values() for drive in self.list_drives().values()]
-        return np.array([value for values in rigid + driven for value in values.values()])
+        forces = [force.values for force in self.list_forces()]
+        return np.array([x for values in (*rigid, *driven, *forces) for x in values.values()])
 
     def has_masses(self) -> bool:
         """Whether the values of the parameters include a mass or a first moment."""

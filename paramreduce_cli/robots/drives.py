@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
 from paramreduce_cli.fields.names import Problem, UnknownNameError
 from paramreduce_cli.fields.numbers import Number
-from paramreduce_cli.fields.section import Section
+from paramreduce_cli.fields.section import Pair, Section
 from paramreduce_cli.records import DRIVE, Drive, FrictionSearch, Kind
 
 ALL = "all"
@@ -18,21 +19,28 @@ ALL = "all"
 
 Value = Number | Literal["unknown"]
 
+
+def _check_table(points: list[list[float]]) -> list[list[float]]:
+    """Return the points of a table, or raise ValueError unless their arguments ascend."""
+    if any(one[0] >= other[0] for one, other in itertools.pairwise(points)):
+        raise ValueError("the first numbers of a table's points must ascend")
+    return points
+
+
+Table = Annotated[list[Pair], Field(min_length=2, max_length=100), AfterValidator(_check_table)]
+"""Points of a piecewise linear function, [[argument, value], ...]."""
+
 _USUAL_FRICTION = (Kind.VISCOUS, Kind.COULOMB, Kind.OFFSET)
 """What a drive has whose friction a log decides."""
 _PROVISIONAL_SMOOTHING = 0.05
 """Smoothing, rad/s (m/s), until a log decides."""
 
 
-class DriveSection(Section):
-    """A drive along one coordinate, or along a weighted sum of several; each value is a number, or `unknown` for a
-    parameter that is still to be found.
+class ForceParameters(Section):
+    """The parameters of a force along a motion; each value is a number, or `unknown` for a parameter that is still to be
+    found.
     """
 
-    motion: Annotated[dict[str, Number], Field(min_length=1)] | None = None
-    """Weights of the coordinates in the motion it acts along, such as {z_1: 100} for a motor behind a gear; if left out the coordinate it is named after."""
-    inertia: Value | None = None
-    """Inertia of the rotor, seen from the motion: kg m^2 (kg if it slides)."""
     viscous: Value | None = None
     """Viscous friction, N m s/rad (N s/m)."""
     coulomb: Value | None = None
@@ -49,37 +57,78 @@ class DriveSection(Section):
     """Viscous friction with the same sign for both directions, N m s/rad (N s/m): friction that differs by direction."""
     quadratic: Value | None = None
     """Friction that goes as speed times its magnitude, N m s^2/rad^2 (N s^2/m^2)."""
-    load: Value | None = None
-    """Friction per load, a plain number: it goes as the magnitude of the torque of gravity times the sign of the speed."""
+    spring_table: Table | None = None
+    """Points [position less `rest`, force] of a spring that is not linear, rad (m), N m (N); straight between them and beyond; one parameter scales the force."""
+    damper_table: Table | None = None
+    """Points [speed, force] of a damper that is not linear, rad/s (m/s), N m (N); straight between them and beyond; one parameter scales the force."""
     smoothing: Annotated[Number, Field(ge=0)] = 0.0
     """Coulomb friction goes as tanh(speed / smoothing), rad/s (m/s); zero for the true sign."""
     stribeck_velocity: Annotated[Number, Field(gt=0)] = 0.1
     """Stribeck friction goes as sign(speed) - tanh(speed / stribeck_velocity), rad/s (m/s), with the sign of Coulomb friction."""
-    friction: Literal["given", "auto"] = "given"
-    """With auto the log decides: viscous and Coulomb friction and an offset are unknown, smoothing is chosen, and stribeck, asymmetry, quadratic and load are added where they help."""
 
     @model_validator(mode="after")
-    def _check_not_empty(self) -> DriveSection:
+    def _check_not_empty(self) -> Self:
         """Raise ValueError if the section gives nothing."""
         if not self.get_values() and not {"smoothing", "stribeck_velocity"} & self.model_fields_set:
-            raise ValueError(f"is empty; give one of {', '.join(kind.key for kind in DRIVE)}")
+            raise ValueError(
+                f"is empty; give one of {', '.join(k.key for k in self._list_kinds())}"
+            )
         return self
 
+    @classmethod
+    def _list_kinds(cls) -> list[Kind]:
+        """Return the kinds of parameters that the section has keys for."""
+        return [kind for kind in DRIVE if kind.key in cls.model_fields]
+
+    def _get_given(self) -> dict[Kind, Any]:
+        """Return what the config gives for each kind of parameter: a number, a table, `unknown` or None."""
+        return {kind: getattr(self, kind.key) for kind in self._list_kinds()}
+
     def get_values(self) -> dict[Kind, float]:
-        """Return the values of the drive's parameters by kind; zero for unknown ones."""
-        given = {kind: getattr(self, kind.key) for kind in DRIVE}
-        if self.friction == "auto":
-            given |= {kind: "unknown" for kind in _USUAL_FRICTION if given[kind] is None}
+        """Return the values of the parameters by kind: zero for unknown ones, one for tables, which they scale."""
+        special = {Kind.SPRING_TABLE: 1.0, Kind.DAMPER_TABLE: 1.0}
         return {
-            kind: 0.0 if value == "unknown" else value
-            for kind, value in given.items()
+            kind: 0.0 if value == "unknown" else special.get(kind, value)
+            for kind, value in self._get_given().items()
             if value is not None
         }
 
     def list_unknown(self) -> list[str]:
         """Return the keys of the values that are still to be found."""
-        known = [kind for kind in DRIVE if getattr(self, kind.key) not in (None, "unknown")]
-        return [kind.key for kind in self.get_values() if kind not in known]
+        return [kind.key for kind, value in self._get_given().items() if value == "unknown"]
+
+    def get_characteristic(self) -> dict[str, Any]:
+        """Return what a drive's record says of its springs, dampers and friction, by field."""
+        tables = {key: getattr(self, key) for key in ("spring_table", "damper_table")}
+        arrays = {key: None if value is None else np.array(value) for key, value in tables.items()}
+        return {
+            "smoothing": self.smoothing,
+            "rest": self.rest,
+            "stribeck_velocity": self.stribeck_velocity,
+            **arrays,
+        }
+
+
+class DriveSection(ForceParameters):
+    """A drive along one coordinate, or along a weighted sum of several; each value is a number, or `unknown` for a
+    parameter that is still to be found.
+    """
+
+    motion: Annotated[dict[str, Number], Field(min_length=1)] | None = None
+    """Weights of the coordinates in the motion it acts along, such as {z_1: 100} for a motor behind a gear; if left out the coordinate it is named after."""
+    inertia: Value | None = None
+    """Inertia of the rotor, seen from the motion: kg m^2 (kg if it slides)."""
+    load: Value | None = None
+    """Friction per load, a plain number: it goes as the magnitude of the torque of gravity times the sign of the speed."""
+    friction: Literal["given", "auto"] = "given"
+    """With auto the log decides: viscous and Coulomb friction and an offset are unknown, smoothing is chosen, and stribeck, asymmetry, quadratic and load are added where they help."""
+
+    def _get_given(self) -> dict[Kind, Any]:
+        """Return what the config gives for each kind of parameter, and `unknown` for friction that a log decides."""
+        given = super()._get_given()
+        if self.friction == "auto":
+            given |= {kind: "unknown" for kind in _USUAL_FRICTION if given[kind] is None}
+        return given
 
     def apply_friction(self, search: FrictionSearch, k: int) -> DriveSection:
         """Return the section with the k-th friction that was found; terms that are added are unknown."""
@@ -130,10 +179,10 @@ class DriveSection(Section):
         weights = np.zeros(len(coordinates))
         for coordinate, weight in (self.motion or {name: 1.0}).items():
             weights[coordinates.index(coordinate)] = weight
-        smoothing = self.smoothing
+        characteristic = self.get_characteristic()
         if self.friction == "auto" and "smoothing" not in self.model_fields_set:
-            smoothing = _PROVISIONAL_SMOOTHING
-        return Drive(name, weights, smoothing, self.rest, self.stribeck_velocity)
+            characteristic["smoothing"] = _PROVISIONAL_SMOOTHING
+        return Drive(name, weights, **characteristic)
 
 
 def merge_drives(

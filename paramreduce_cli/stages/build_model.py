@@ -14,6 +14,7 @@ from paramreduce_cli.multibody.base_parameters import (
     compute_regrouping,
     find_affecting_parameters,
 )
+from paramreduce_cli.multibody.drive_motions import compute_lengths
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.multibody.loops.assembly import assemble, find_assembly_modes
 from paramreduce_cli.multibody.random_states import draw_states
@@ -37,6 +38,8 @@ _CHANGED_GEOMETRIES = 2
 
 States = tuple[FloatArray, FloatArray, FloatArray]
 
+_NO_LENGTH = 1e-9
+"""Length of a force element that counts as zero, m."""
 _SEED = 0
 """Seed of the random states on which ranks are decided."""
 
@@ -63,6 +66,7 @@ def build_model(
     mechanism = assemble(robot.build_mechanism())
     rng = np.random.default_rng(_SEED)
     states = draw_states(mechanism, _STATES, rng)
+    _check_lengths(mechanism, states[0])
     K = Dynamics(mechanism).compute_regressor(*states)
     measured = robot.find_measured()
     W = K[:, measured].reshape(-1, K.shape[2])
@@ -93,6 +97,28 @@ def build_model(
         nominal_torque_given=given is not None,
         formulations=lean,
     )
+
+
+def _check_lengths(mechanism: Mechanism, q: FloatArray) -> None:
+    """Raise ConfigError if the two points of a force element coincide; warn if they do in the zero position alone.
+
+    Args:
+        mechanism: Mechanism with assembled loops.
+        q: Generalised coordinates of some states, (n_states, n_q).
+    """
+    closed = mechanism.loops is not None
+    start = mechanism.loops.assembly if mechanism.loops is not None else np.zeros(mechanism.n_q)
+    for name, lengths in compute_lengths(mechanism, np.vstack([start, q])).items():
+        if lengths[0] > _NO_LENGTH:
+            continue
+        text = "its two points coincide, so that it has no direction"
+        if closed or lengths.max() <= _NO_LENGTH:
+            raise ConfigError(f"{text}. Move one of them.", ("forces", name, "at"))
+        warnings.warn(
+            f"forces.{name}: with zero for all coordinates {text}; keep away from there",
+            ParamreduceWarning,
+            stacklevel=3,
+        )
 
 
 def _say_other_modes(

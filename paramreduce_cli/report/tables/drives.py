@@ -1,20 +1,20 @@
 """Rotors, friction and springs: along what they act, and their parameters."""
 
-from paramreduce_cli.records import DRIVE, SIGN_FRICTION, Drive, Kind, Mechanism, Parameter
+from paramreduce_cli.records import BASE, DRIVE, SIGN_FRICTION, Drive, Kind, Mechanism, Parameter
 from paramreduce_cli.report.data import ReportData
 from paramreduce_cli.report.page_sections import PageSection, placed
 from paramreduce_cli.texts.table import Table
 
-_RARE = (Kind.STRIBECK, Kind.ASYMMETRY, Kind.QUADRATIC, Kind.LOAD)
-"""Friction that has a column only if there is some."""
+_USUAL = (Kind.ROTOR, Kind.VISCOUS, Kind.COULOMB, Kind.OFFSET, Kind.STIFFNESS)
+"""Kinds that have a column even if no drive has them."""
 
 
 @placed(PageSection.MECHANISM, 4)
 def drives(data: ReportData) -> Table:
-    """Rotors, friction and springs with the weights of the coordinates that they act along."""
+    """Rotors, friction and springs, also those between bodies, with the motions that they act along."""
     mechanism = data.robot_model.mechanism
     present = {parameter.kind for parameter in mechanism.parameters}
-    kinds = [kind for kind in DRIVE if kind in present or kind not in _RARE]
+    kinds = [kind for kind in DRIVE if kind in present or kind in _USUAL]
     rows = []
     for drive in mechanism.drives:
         columns = mechanism.find_drive_columns(drive)
@@ -29,7 +29,8 @@ def drives(data: ReportData) -> Table:
         sign = _sign(drive) if columns.keys() & set(SIGN_FRICTION) else ""
         if Kind.STRIBECK in columns:
             sign += f"; Stribeck beyond {drive.stribeck_velocity:g}"
-        slack = f"{drive.rest:g}" if Kind.STIFFNESS in columns else ""
+        sprung = {Kind.STIFFNESS, Kind.SPRING_TABLE} & columns.keys()
+        slack = f"{drive.rest:g}" if sprung else ""
         rows.append((drive.name, _describe_motion(mechanism, drive), *cells, sign, slack))
     header = ("drive", "motion", *(kind.symbol for kind in kinds), "sign of speed", "slack at")
     return Table("Rotors, friction and springs", header, tuple(rows))
@@ -40,7 +41,13 @@ def _format_cell(parameter: Parameter, value: float) -> str:
 
 
 def _describe_motion(mechanism: Mechanism, drive: Drive) -> str:
-    """Return the weighted sum of coordinates that a drive acts along."""
+    """Return the weighted sum of coordinates, or the motion between two bodies, that a drive acts along."""
+    if drive.between is not None:
+        first, second = (
+            "base" if k == BASE else mechanism.bodies[k].name for k in drive.between.bodies
+        )
+        axis = " xyz"[drive.between.axis + 1] if drive.between.kind in ("shift", "turn") else ""
+        return f"{drive.between.kind} {axis} of {second} from {first}".replace("  ", " ")
     names = zip(drive.weights.tolist(), mechanism.generalised_names, strict=True)
     terms = [f"{'' if weight == 1 else f'{weight:g} '}{name}" for weight, name in names if weight]
     return " + ".join(terms).replace("+ -", "- ")
