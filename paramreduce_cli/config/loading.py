@@ -17,8 +17,10 @@ from paramreduce_cli.config import yaml_reading
 from paramreduce_cli.config.checks import find_problems, find_warnings
 from paramreduce_cli.config.coordinate_lists import cut_to_independent
 from paramreduce_cli.config.former_keys import FORMER_KEYS
+from paramreduce_cli.config.named_points import resolve_points
 from paramreduce_cli.config.schema import Config, Settings
 from paramreduce_cli.config.sections import find_keys
+from paramreduce_cli.config.subsystems import expand_subsystems
 from paramreduce_cli.config.yaml_reading import Document
 from paramreduce_cli.errors import ConfigError, Key, ParamreduceWarning, prepend_key
 from paramreduce_cli.fields.names import Problem, UnknownNameError
@@ -50,7 +52,9 @@ def load_config(path: Path, overrides: Sequence[str] = ()) -> Config:
             yaml_reading.apply_override(document, text)
         except ValueError as error:
             raise ConfigError(str(error)) from error
-    config, problems = _find_all_problems(document.data)
+    config, problems = None, _expand(document)
+    if not problems:
+        config, problems = _find_all_problems(document.data)
     lines = [f"{document.source}, line {line}: {message}." for line, message in document.problems]
     lines += [
         _format_problem(document, problem)
@@ -149,6 +153,7 @@ def locate_errors(path: Path | None, overrides: Sequence[str] = ()) -> Iterator[
         document = _read_document(path)
         for text in overrides:
             yaml_reading.apply_override(document, text)
+        _expand(document)
         error.place = document.describe_place(error.key)
         error.in_file = error.place.startswith(f"{document.source}, line ")
         raise
@@ -246,6 +251,12 @@ def _replace_item(value: str, place: Key, name: str) -> str:
         where = where[step]
     where[place[-1]] = name
     return str(yaml.safe_dump(items, default_flow_style=True, width=10**6)).strip()
+
+
+def _expand(document: Document) -> list[Problem]:
+    """Write out subsystems and named points in the data of a document, and return what is wrong with them."""
+    constants, _ = read_constants(document.data.get("constants"))
+    return expand_subsystems(document) or resolve_points(document, constants)
 
 
 def _find_all_problems(data: dict[str, Any]) -> tuple[Config | None, list[Problem]]:
@@ -388,7 +399,8 @@ def _format_problem(document: Document, problem: Problem) -> str:
     """Return a problem as a line with file, line and key."""
     path, message = problem[0], str(problem[1])
     end = "" if message.rstrip().endswith((".", "?")) else "."
-    return f"{document.describe_place(path)}: {prepend_key(path, message)}{end}"
+    key = document.find_original(path)
+    return f"{document.describe_place(path)}: {prepend_key(key, message)}{end}"
 
 
 def _drop_unused_tests(config: Config) -> Config:

@@ -35,6 +35,15 @@ class Document:
     """Keys whose values are None for one of these problems."""
     overrides: dict[Key, str] = field(default_factory=dict)
     """Keys set on the command line, with the text given there."""
+    originals: dict[Key, Key] = field(default_factory=dict)
+    """Keys of parts that were copied, with the keys that they were copied from."""
+
+    def find_original(self, path: Key) -> Key:
+        """Return the key that a key was copied from, or the key itself."""
+        for end in range(len(path), 0, -1):
+            if path[:end] in self.originals:
+                return (*self.originals[path[:end]], *path[end:])
+        return path
 
     def describe_place(self, path: Key) -> str:
         """Return file and line of a key, or of its nearest ancestor in the file; ``--set ...`` if the command line gave

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import Field, PrivateAttr, model_validator
@@ -69,6 +69,38 @@ class Description(Section):
         return self._list_given()[self.kind]
 
 
+class SubsystemSection(Section):
+    """A part of the mechanism that is written once and used several times; its keys are those of the config that they are copied to."""
+
+    points: dict[Name, Any] = {}
+    """Named points, as under description.tree.points."""
+    bodies: list[dict[str, Any]] = []
+    """Bodies, as under description.tree.bodies; parents may be bodies of the config."""
+    closures: list[dict[str, Any]] = []
+    """Closures of loops, as under description.tree.closures."""
+    independent: list[Name] = []
+    """Coordinates that are actuated, as under description.tree.independent."""
+    guess: dict[Name, Any] = {}
+    """Values of coordinates near a closed assembly, as under description.tree.guess."""
+    parameters: dict[Name, Any] = {}
+    """Standard parameters of the bodies, as under parameter_sets.NAME."""
+    drives: dict[Name, Any] = {}
+    """Rotors, friction and springs, as under drives."""
+    forces: dict[Name, Any] = {}
+    """Force elements, as under forces."""
+
+
+class UseSection(Section):
+    """A use of a subsystem."""
+
+    subsystem: Name
+    """Name of the subsystem."""
+    suffix: Annotated[str, Field(pattern=r"^[A-Za-z0-9_.-]*$")] = ""
+    """Text that is added to the names of all bodies, coordinates, points, closures, drives and forces of the subsystem."""
+    mirror: Literal["x", "y", "z"] | None = None
+    """Axis of the base whose direction is reversed in this use: y makes the right side of a vehicle of the left."""
+
+
 class Robot(Section):
     """The part of a config that describes the robot, whatever is done with it."""
 
@@ -76,6 +108,10 @@ class Robot(Section):
     """Name of the robot; results go to results/ROBOT."""
     constants: dict[str, Number] = {}
     """Named numbers, such as lengths in m, that all other numbers may be written with; each may use those above it."""
+    subsystems: dict[Name, SubsystemSection] = {}
+    """Parts of the mechanism that are used several times."""
+    uses: list[UseSection] = []
+    """Uses of subsystems: with every use their bodies, closures, drives and forces are added under names with a suffix."""
     description: Description
     """The mechanism."""
     parameter_sets: Annotated[dict[str, dict[str, BodyParameters]], Field(min_length=1)]

@@ -14,7 +14,7 @@ from paramreduce_cli.fields.numbers import Number
 from paramreduce_cli.fields.section import Name, Positive, Section
 from paramreduce_cli.records import Drive, FloatArray, Kind, MotionBetween, MotionKind
 from paramreduce_cli.robots.drives import ForceParameters, Table, Value
-from paramreduce_cli.robots.placement import Placement, compose_steps
+from paramreduce_cli.robots.placement import ONE_PLACE_OR_TWO, Placement, compose_steps
 
 _AXES = ("x", "y", "z", "rx", "ry", "rz")
 _AXLE = 1
@@ -75,8 +75,8 @@ class _BetweenBodies(Section):
 
     bodies: Annotated[list[Name], Field(min_length=2, max_length=2)]
     """The two bodies, `base` for the base."""
-    at: Annotated[list[Placement], Field(min_length=2, max_length=2)]
-    """Place on each of the two bodies: a point, or steps to a frame."""
+    at: Annotated[list[Placement], Field(min_length=2, max_length=2), ONE_PLACE_OR_TWO]
+    """Place on each of the two bodies: a point, the name of a point, or steps to a frame; one name for both if they meet there."""
 
     def _list_bodies(self) -> list[tuple[tuple[str | int, ...], str]]:
         """Return the two bodies with their keys."""

@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import Annotated, Any
 
 import numpy as np
-from pydantic import BeforeValidator, Field, model_validator
+from pydantic import BeforeValidator, Field, WithJsonSchema, model_validator
 
 from paramreduce_cli.fields.numbers import Number
-from paramreduce_cli.fields.section import Section, Triple
+from paramreduce_cli.fields.section import VECTOR, Section, Triple
 from paramreduce_cli.records import INERTIAL, FloatArray, Kind
 
 _FIRST_MOMENTS = (Kind.MX, Kind.MY, Kind.MZ)
@@ -52,8 +52,8 @@ class BodyParameters(Section):
     """Tensor element, kg m^2."""
     Izz: Number = 0.0
     """Inertia about the frame's origin, kg m^2."""
-    com: Triple | None = None
-    """Centre of mass in the body's frame, m; instead of mx, my, mz. Without inertias: a point mass."""
+    com: Annotated[Triple, WithJsonSchema({"anyOf": [VECTOR, {"type": "string"}]})] | None = None
+    """Centre of mass in the body's frame, m, or the name of a point; instead of mx, my, mz. Without inertias: a point mass."""
     inertia_com: (
         Annotated[
             list[Number], BeforeValidator(_take_upper_triangle), Field(min_length=6, max_length=6)

@@ -50,12 +50,12 @@ _STEP = {
     "minProperties": 1,
     "maxProperties": 1,
 }
-Placement = Annotated[
-    list[Step],
-    BeforeValidator(_list_steps),
-    WithJsonSchema({"anyOf": [VECTOR, _STEP, {"type": "array", "items": _STEP}]}),
-]
-"""A point [x, y, z], or steps that are taken one after the other."""
+_NAME = {"type": "string"}
+_PLACE = {"anyOf": [VECTOR, _STEP, _NAME, {"type": "array", "items": {"anyOf": [_STEP, _NAME]}}]}
+ONE_PLACE_OR_TWO = WithJsonSchema({"anyOf": [_NAME, {"type": "array", "items": _PLACE}]})
+"""Two places, or the name of a point for both."""
+Placement = Annotated[list[Step], BeforeValidator(_list_steps), WithJsonSchema(_PLACE)]
+"""A point [x, y, z], or steps that are taken one after the other; names of points are replaced before."""
 
 
 _NAMED_DIRECTIONS = {
@@ -76,7 +76,9 @@ def _check_direction(value: list[float]) -> list[float]:
     return value
 
 
-DIRECTION = {"anyOf": [{"enum": list(_NAMED_DIRECTIONS)}, VECTOR]}
+DIRECTION = {
+    "anyOf": [{"enum": list(_NAMED_DIRECTIONS)}, {"type": "string", "pattern": "^-?to "}, VECTOR]
+}
 Direction = Annotated[
     Triple,
     BeforeValidator(_read_direction),

@@ -13,7 +13,14 @@ from pydantic import BeforeValidator, Field, WithJsonSchema, model_validator
 
 from paramreduce_cli.fields.names import Problem, UnknownNameError
 from paramreduce_cli.fields.numbers import Number
-from paramreduce_cli.fields.section import ONE_OR_MORE_NAMES, Name, Positive, Section, wrap_in_list
+from paramreduce_cli.fields.section import (
+    ONE_OR_MORE_NAMES,
+    Name,
+    Positive,
+    Section,
+    Triple,
+    wrap_in_list,
+)
 from paramreduce_cli.records import (
     BASE,
     JOINT_AXES,
@@ -26,7 +33,13 @@ from paramreduce_cli.records import (
 )
 from paramreduce_cli.robots.bodies import BodiesDescription
 from paramreduce_cli.robots.frames import to_axis_angle
-from paramreduce_cli.robots.placement import DIRECTION, Direction, Placement, compose_steps
+from paramreduce_cli.robots.placement import (
+    DIRECTION,
+    ONE_PLACE_OR_TWO,
+    Direction,
+    Placement,
+    compose_steps,
+)
 
 JointMotion = tuple[Literal["revolute", "prismatic"], FloatArray]
 """A kind of motion and the direction of its axis, (3,)."""
@@ -97,9 +110,9 @@ class TreeBody(Section):
     axes: Annotated[
         list[Direction], BeforeValidator(_list_directions), _ONE_OR_MORE_DIRECTIONS
     ] = []
-    """Axes of the joint in its frame; if left out z, or x and y for a universal joint."""
+    """Axes of the joint in its frame, also `to NAME` for the direction to a named point, `-to NAME` for the opposite one; if left out z, or x and y for a universal joint."""
     at: Placement = []
-    """The joint's frame in the parent's: a point, or steps; the body's frame is there at zero coordinates."""
+    """The joint's frame in the parent's: a point, the name of a point, or steps; the body's frame is there at zero coordinates."""
     coordinates: Annotated[list[Name], BeforeValidator(wrap_in_list), ONE_OR_MORE_NAMES] = []
     """Names of the joint's coordinates; if left out q_NAME, or q_NAME_1, q_NAME_2, ..."""
     massless: bool = False
@@ -180,10 +193,10 @@ class ClosureSection(Section):
     """`point`: two points coincide (3 equations); `planar`: the second is on the z axis of the first (2); `revolute`: origins and z axes coincide (5); `distance`: two points keep a distance (1); `fixed`: the frames coincide (6); `prismatic`: but for a shift along z (5); `cylindrical`: z axes coincide (4); `universal`: origins coincide, x of the first stays perpendicular to y of the second (4); `coupling`: the second body's coordinate is ratio times the first one's, plus offset (1)."""
     bodies: Annotated[list[Name], Field(min_length=2, max_length=2)]
     """The two bodies, `base` for the base."""
-    at: Annotated[list[Placement], Field(max_length=2)] = []
-    """Place on each of the two bodies: a point or steps; not for a coupling."""
+    at: Annotated[list[Placement], Field(max_length=2), ONE_PLACE_OR_TWO] = []
+    """Place on each of the two bodies: a point, the name of a point, or steps; one name for both if they meet there; not for a coupling."""
     length: Positive | None = None
-    """Length of a distance, m."""
+    """Length of a distance, m; between two named points it is their distance if left out."""
     ratio: Number | None = None
     """Ratio of a coupling; not zero."""
     offset: Number | None = None
@@ -225,6 +238,8 @@ class TreeDescription(BodiesDescription):
 
     ROWS: ClassVar[str] = "bodies"
 
+    points: dict[Name, Triple] = {}
+    """Named points in the base frame while all coordinates are zero, m, such as the hardpoints of a suspension. `at`, `com` and `axes: to NAME` may use their names."""
     bodies: Annotated[list[TreeBody], Field(min_length=1)]
     """One item per body, parents above their children."""
     closures: list[ClosureSection] = []
