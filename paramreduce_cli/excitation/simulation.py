@@ -7,6 +7,7 @@ each other to round-off whatever the integration's error.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 import scipy  # whose integrate is loaded when it is used
@@ -64,18 +65,54 @@ class SimulatedMotion:
     """Inputs, zero where there is none, (n_samples, n_dof), N m or N."""
 
 
+class MassAndBias(Protocol):
+    """The mass matrix and bias of a mechanism at single states that follow each other."""
+
+    def __call__(self, z: FloatArray, dz: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return M, (n_dof, n_dof), and delta, (n_dof,), at positions and velocities, (n_dof,) each."""
+
+    def restart(self) -> None:
+        """Follow loops from the assembly again, instead of from the last state."""
+
+
+class TextbookMassAndBias:
+    """The mass matrix and bias by the regressor.
+
+    Args:
+        dynamics: Dynamics of the mechanism.
+        phi: Standard parameters, (n_parameters,).
+    """
+
+    def __init__(self, dynamics: Dynamics, phi: FloatArray) -> None:
+        self._dynamics, self._phi = dynamics, phi
+        self._coordinates = Coordinates(dynamics.mechanism)
+        self._near: FloatArray | None = None
+        """Where the mechanism was last, to close its loops from."""
+
+    def restart(self) -> None:
+        """Close the loops from the assembly again, instead of from their last position."""
+        self._near = None
+
+    def __call__(self, z: FloatArray, dz: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return M, (n_dof, n_dof), and delta, (n_dof,), at positions and velocities, (n_dof,) each.
+
+        Raises:
+            DataError: The loops cannot be closed.
+        """
+        q = self._coordinates.compute_positions(z[None], self._near)
+        self._near = q[0]
+        dq, _ = self._coordinates.compute_rates(q, dz[None], np.zeros((1, dz.size)))
+        M, delta = self._dynamics.compute_mass_matrix_and_bias(q, dq, self._phi)
+        return M[0], delta[0]
+
+
 def simulate(
-    dynamics: Dynamics,
-    phi: FloatArray,
-    inputs: Sequence[Input],
-    start: FloatArray,
-    time: FloatArray,
+    dynamics: MassAndBias, inputs: Sequence[Input], start: FloatArray, time: FloatArray
 ) -> SimulatedMotion:
     """Simulate the mechanism from rest under given inputs.
 
     Args:
-        dynamics: Dynamics of the mechanism.
-        phi: Standard parameters of the full model, (n_parameters,).
+        dynamics: Mass matrix and bias of the mechanism.
         inputs: Inputs, one per independent coordinate.
         start: Independent coordinates to start from, (n_dof,), rad or m.
         time: Time of the samples, from zero, (n_samples,), s.
@@ -83,7 +120,8 @@ def simulate(
     Raises:
         DataError: The motion grows beyond all bounds, or the loops cannot be closed.
     """
-    forward = _ForwardDynamics(dynamics, phi, inputs, _MOST_EVALUATIONS * time.size)
+    dynamics.restart()
+    forward = _ForwardDynamics(dynamics, inputs, _MOST_EVALUATIONS * time.size)
     n = start.size
     state = np.concatenate([start, np.zeros(n)])
     with np.errstate(over="ignore", invalid="ignore"):
@@ -94,7 +132,7 @@ def simulate(
     z, dz = found.y[:n].T, found.y[n:].T
     if not found.success or not np.isfinite(found.y).all():
         raise _make_divergence_error(float(found.t[-1]) if found.t.size else 0.0)
-    forward.restart()
+    dynamics.restart()
     tau = np.array([forward.compute_inputs(*sample) for sample in zip(time, z, dz, strict=True)])
     samples = zip(time, z, dz, strict=True)
     ddz = np.array([forward.compute_rates(t, np.concatenate([*some]))[n:] for t, *some in samples])
@@ -112,19 +150,10 @@ def _make_divergence_error(time: float) -> DataError:
 class _ForwardDynamics:
     """The forward dynamics of a mechanism under inputs."""
 
-    def __init__(
-        self, dynamics: Dynamics, phi: FloatArray, inputs: Sequence[Input], most: int
-    ) -> None:
-        self._dynamics, self._phi, self._inputs = dynamics, phi, inputs
+    def __init__(self, dynamics: MassAndBias, inputs: Sequence[Input], most: int) -> None:
+        self._dynamics, self._inputs = dynamics, inputs
         self._left = most
         """Evaluations until the motion is given up."""
-        self._coordinates = Coordinates(dynamics.mechanism)
-        self._near: FloatArray | None = None
-        """Where the mechanism was last, to close its loops from."""
-
-    def restart(self) -> None:
-        """Close the loops from the assembly again, instead of from their last position."""
-        self._near = None
 
     def compute_inputs(self, time: float, z: FloatArray, dz: FloatArray) -> FloatArray:
         """Return the forces on the independent coordinates, (n_dof,)."""
@@ -141,12 +170,9 @@ class _ForwardDynamics:
         if self._left < 0 or not np.isfinite(state).all():
             raise _make_divergence_error(time)
         z, dz = np.split(state, 2)
-        q = self._coordinates.compute_positions(z[None], self._near)
-        self._near = q[0]
-        dq, _ = self._coordinates.compute_rates(q, dz[None], np.zeros((1, dz.size)))
-        M, delta = self._dynamics.compute_mass_matrix_and_bias(q, dq, self._phi)
+        M, delta = self._dynamics(z, dz)
         try:
-            ddz = np.linalg.solve(M[0], self.compute_inputs(time, z, dz) - delta[0])
+            ddz = np.linalg.solve(M, self.compute_inputs(time, z, dz) - delta)
         except np.linalg.LinAlgError as error:
             raise DataError(
                 f"the mass matrix is singular at {time:.3g} s, as where a moving body has no mass; "

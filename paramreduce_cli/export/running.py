@@ -9,11 +9,11 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from paramreduce_cli.errors import ParamreduceWarning
+from paramreduce_cli.errors import DataError, ParamreduceWarning
 from paramreduce_cli.export.code_generation import Exported, make_exported_model
 from paramreduce_cli.export.exported_model import ExportedModel
 from paramreduce_cli.export.languages import languages
-from paramreduce_cli.expressions.compiled import load
+from paramreduce_cli.expressions.compiled import get_address, load
 from paramreduce_cli.expressions.functions import Argument
 from paramreduce_cli.records import FloatArray, LoopEvaluation, Model, ReducedModel, Speed
 
@@ -87,6 +87,86 @@ def _write_source(exported: ExportedModel) -> tuple[str, str]:
     stem = next(file[:-2] for file in files if file.endswith(".h"))
     header, source = (files[f"{stem}.{end}"].decode() for end in ("h", "c"))
     return stem, header + source.replace(f'#include "{stem}.h"', "")
+
+
+_EVALUATION = """
+int evaluate(const double *phi, const double *z, const double *dz, double *q, double *R, double *M, double *delta) {{
+  double b[{n_d}], dq[{n_q}], ddq[{n_q}], ddz[{n_z}];
+  for (int i = 0; i < {n_z}; ++i) ddz[i] = 0;
+  if ({stem}_states(z, dz, ddz, 0, q, R, b, dq, ddq) < 0) return -1;
+  {stem}_direct_dynamics({arguments}, M, delta);
+  return 0;
+}}
+"""
+
+
+class CompiledForwardDynamics:
+    """The mass matrix and bias of a model at single states, from its exported C code.
+
+    Loops are followed from the last state.
+
+    Args:
+        model: Model of the robot.
+        chosen: The model, with expressions.
+    """
+
+    def __init__(self, model: Model, chosen: ReducedModel) -> None:
+        mechanism = model.mechanism
+        self._mechanism, self._phi = mechanism, np.ascontiguousarray(chosen.values)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", ParamreduceWarning)
+            exported = make_exported_model(model, chosen, title="", what=Exported.DDM)
+        stem, text = _write_source(exported)
+        (direct,) = exported.functions
+        n_q, n_z = mechanism.n_q, mechanism.n_dof
+        if mechanism.loops is not None:
+            names = ", ".join(argument.name for argument in direct.arguments)
+            sizes = {"n_q": n_q, "n_z": n_z, "n_d": n_q - n_z}
+            text += _EVALUATION.format(stem=stem, arguments=names, **sizes)
+        self._library = load(text)
+        self._direct = f"{stem}_direct_dynamics"
+        self._arguments = [argument.name for argument in direct.arguments]
+        self._q, self._R = np.empty(n_q), np.empty((n_q - n_z, n_z))
+        self._M, self._delta = np.empty((n_z, n_z)), np.empty(n_z)
+        self.restart()
+
+    @property
+    def is_compiled(self) -> bool:
+        """Whether there is compiled code; without a compiler it cannot be called."""
+        return self._library is not None
+
+    def restart(self) -> None:
+        """Follow the loops from the assembly again, instead of from the last state."""
+        if self._mechanism.loops is not None:
+            self._q[:] = self._mechanism.loops.assembly
+            self._R[:] = 0.0
+
+    def __call__(self, z: FloatArray, dz: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return M, (n_dof, n_dof), and delta, (n_dof,), at positions z and velocities dz, (n_dof,) each.
+
+        Raises:
+            DataError: The loops cannot be closed.
+        """
+        assert self._library is not None
+        arrays = {
+            "phi": self._phi,
+            "q": z,
+            "dq": dz,
+            "z": z,
+            "dz": dz,
+            "M": self._M,
+            "delta": self._delta,
+        }
+        names = [*self._arguments, "M", "delta"]
+        function = getattr(self._library, self._direct)
+        if self._mechanism.loops is not None:
+            arrays |= {"q": self._q, "R": self._R}
+            names = ["phi", "z", "dz", "q", "R", "M", "delta"]
+            function = self._library.evaluate
+        failed = function(*(ctypes.c_void_p(get_address(arrays[name])) for name in names))
+        if self._mechanism.loops is not None and failed:
+            raise DataError("the loops cannot be closed")
+        return self._M, self._delta
 
 
 class RunningModel:

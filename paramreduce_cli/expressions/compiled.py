@@ -98,7 +98,7 @@ class BatchFunction:
             self._in_lengths,
             _to_c_pointers(outs),
             self._out_lengths,
-            ctypes.c_void_p(_get_address(work)),
+            ctypes.c_void_p(get_address(work)),
         )
         return outs
 
@@ -121,10 +121,10 @@ def _to_c_numbers(values: list[int]) -> ctypes.Array:
 
 
 def _to_c_pointers(arrays: list[FloatArray]) -> ctypes.Array:
-    return (ctypes.c_void_p * len(arrays))(*map(_get_address, arrays))
+    return (ctypes.c_void_p * len(arrays))(*map(get_address, arrays))
 
 
-def _get_address(array: FloatArray) -> int:
+def get_address(array: FloatArray) -> int:
     """Return the address of an array; `array.ctypes` takes longer than many a function of one sample."""
     address: int = array.__array_interface__["data"][0]
     return address

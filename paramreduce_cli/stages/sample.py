@@ -20,8 +20,15 @@ from paramreduce_cli.excitation.fourier import (
     shift_start,
 )
 from paramreduce_cli.excitation.point_to_point import evaluate_along
-from paramreduce_cli.excitation.simulation import Input, SimulatedMotion, simulate
+from paramreduce_cli.excitation.simulation import (
+    Input,
+    MassAndBias,
+    SimulatedMotion,
+    TextbookMassAndBias,
+    simulate,
+)
 from paramreduce_cli.excitation.symmetry import complete_series, generate_group
+from paramreduce_cli.export.running import CompiledForwardDynamics
 from paramreduce_cli.fields.section import expand_per_joint
 from paramreduce_cli.identification.measured_samples import LoggedSet
 from paramreduce_cli.multibody.dynamics import Dynamics
@@ -54,6 +61,7 @@ from paramreduce_cli.records import (
     SampleSet,
     Trajectories,
 )
+from paramreduce_cli.reduction.models import make_full_model
 from paramreduce_cli.resources.item_completion import complete_items
 
 ComputedSet = ObservedSet | LoggedSet
@@ -308,6 +316,7 @@ def _sample_simulation(
     z = np.zeros(mechanism.n_dof)
     if mechanism.loops is not None:
         z = mechanism.loops.assembly[list(mechanism.independent)]
+    direct = _choose_forward_dynamics(model, dynamics)
     motions: list[SimulatedMotion] = []
     counts = (section.runs, section.validation_runs, section.test_runs)
     runs = dict(zip(SETS, counts, strict=True))[name]
@@ -317,7 +326,7 @@ def _sample_simulation(
         for coordinate, (lower, upper) in section.start.items():
             start[mechanism.coordinate_names.index(coordinate)] = rng.uniform(lower, upper)
         try:
-            motions.append(simulate(dynamics, model.values, inputs, start, time))
+            motions.append(simulate(direct, inputs, start, time))
         except DataError as error:
             raise ConfigError(f"{name} set: {error}", ("sampling", "simulation")) from error
         report_progress(Progress(f"simulate motions of the {name} set", done + 1, runs))
@@ -328,6 +337,12 @@ def _sample_simulation(
         model.values,
         f"{name} set",
     )
+
+
+def _choose_forward_dynamics(model: Model, dynamics: Dynamics) -> MassAndBias:
+    """Return the mass matrix and bias of the full model: compiled code, or the regressor without a compiler."""
+    compiled = CompiledForwardDynamics(model, make_full_model(model))
+    return compiled if compiled.is_compiled else TextbookMassAndBias(dynamics, model.values)
 
 
 def _make_input(section: InputSection | None, rng: np.random.Generator) -> Input:

@@ -6,7 +6,7 @@ from conftest import TWO_LINK, config_and_model
 from oracles.lagrange import Lagrange, forward_dynamics
 from scipy.integrate import simpson
 
-from paramreduce_cli.excitation.simulation import Input, simulate
+from paramreduce_cli.excitation.simulation import Input, TextbookMassAndBias, simulate
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.multibody.loops.coordinates import Coordinates
 from paramreduce_cli.records import Recordings
@@ -66,7 +66,9 @@ def test_energy_is_what_inputs_brought_and_friction_took():
     time = np.linspace(0, 2, 2001)
     push = Input(amplitude=2.0, frequencies=(0.7, 1.9), phases=(0.3, 1.0), stiffness=5, damping=1)
     start = np.array([0.1, 0.8])
-    motion = simulate(Dynamics(mechanism), model.values, [push, Input()], start, time)
+    motion = simulate(
+        TextbookMassAndBias(Dynamics(mechanism), model.values), [push, Input()], start, time
+    )
     n = time.size
     states = motion.z.T, motion.dz.T, np.zeros_like(motion.dz.T)
     phi = np.tile(model.values, (n, 1)).T
