@@ -332,12 +332,12 @@ def _read_optional(reader: Reader, name: str, size: int) -> FloatArray | None:
     """Return a vector of finite numbers, or None if the file has none.
 
     Raises:
-        ArtifactError: The vector has another length, or numbers that are not finite; nominal torques may be infinite.
+        ArtifactError: The vector has another length, or numbers that are not finite; nominal torques and accelerations may be infinite.
     """
     if name not in reader:
         return None
     value = reader.read_array(name, 1)
-    numbers = ~np.isnan(value) if name == "nominal_torque" else np.isfinite(value)
+    numbers = ~np.isnan(value) if name.startswith("nominal") else np.isfinite(value)
     if value.size != size or not numbers.all():
         raise ArtifactError(f"{reader.path}: /{name} must hold {size} finite numbers.")
     return value

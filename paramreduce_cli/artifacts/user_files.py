@@ -11,7 +11,7 @@ from paramreduce_cli.artifacts.atomic import make_missing_error
 from paramreduce_cli.artifacts.csv_files import read_csv
 from paramreduce_cli.artifacts.hdf5 import Reader, open_reader
 from paramreduce_cli.errors import DataError
-from paramreduce_cli.records import SETS, Coefficients, FloatArray, Recording
+from paramreduce_cli.records import SETS, Coefficients, FloatArray, Recording, SignalTable
 
 _HDF5 = (".h5", ".hdf5")
 _FEWEST_SAMPLES = 10
@@ -124,6 +124,29 @@ def load_recording(path: Path, n_dof: int) -> Recording:
     return Recording(
         str(path), time.ravel(), arrays["z"], arrays["dz"], arrays["ddz"], arrays.get("tau")
     )
+
+
+def load_signals(path: Path) -> SignalTable:
+    """Read a table whose first column holds ascending times or distances, and the others signals.
+
+    Raises:
+        DataError: The table has one column or row, or the first column does not ascend.
+        ArtifactError: The file cannot be read.
+    """
+    table = read_csv(path)
+    numbers = table.numbers
+    if numbers.shape[0] < _FEWEST_SAMPLES or numbers.shape[1] < 2:
+        raise DataError(
+            f"{path}: a signal needs a column of times or distances, columns of values, and at least "
+            f"{_FEWEST_SAMPLES} rows; there are {numbers.shape[1]} columns and {numbers.shape[0]} rows."
+        )
+    steps = np.diff(numbers[:, 0])
+    if not np.all(steps > 0):
+        row = int(np.argmin(steps)) + 2
+        raise DataError(
+            f"{path}: {table.header[0]} does not rise in data row {row}. Sort the rows, or remove repeated ones."
+        )
+    return SignalTable(str(path), numbers[:, 0], numbers[:, 1:])
 
 
 def _check_time(path: Path, time: FloatArray) -> None:

@@ -212,7 +212,8 @@ def _check_simulation(config: Config) -> Iterator[Problem]:
         return
     path: Key = ("sampling", "simulation")
     names = config.description.bodies.list_independent_coordinates()
-    for key, given in (("inputs", section.inputs), ("start", section.start)):
+    for key in ("inputs", "motions", "start", "speed"):
+        given = getattr(section, key)
         for name in given:
             if name not in names:
                 yield (*path, key, name), UnknownNameError("independent coordinate", name, names)
@@ -229,7 +230,23 @@ def _check_simulation(config: Config) -> Iterator[Problem]:
     sampling = config.sampling
     if any(sampling.list_recordings().values()) or sampling.symmetries:
         yield path, "makes all sets; leave out files and symmetries"
-    still = [name for name in names if name not in {*section.inputs, *config.unmeasured}]
+    for k, track in enumerate([] if section.road is None else section.road.tracks):
+        for j, name in enumerate(track):
+            if name not in names:
+                error = UnknownNameError("independent coordinate", name, names)
+                yield (*path, "road", "tracks", k, j), error
+    if not section.inputs and not section.prescribed:
+        yield path, "has no input; give inputs, motions or a road"
+    for name in section.prescribed:
+        if section.prescribed.count(name) > 1:
+            yield path, f"prescribes the motion of {name} twice"
+        if name in section.inputs:
+            yield (
+                (*path, "inputs", name),
+                f"is a force on {name}, whose motion is prescribed; remove one of them",
+            )
+    moved = {*section.inputs, *section.prescribed, *config.unmeasured}
+    still = [name for name in names if name not in moved]
     if still and config.nominal_torque == "standard-deviation":
         yield (
             ("nominal_torque",),

@@ -430,6 +430,12 @@ def _resolve_paths(config: Config, folder: Path) -> Config:
             files["held_out"] = [[folder / path for path in parts] for parts in others]
         log = sampling.log.model_copy(update=files)
         sampling = sampling.model_copy(update={"log": log})
+    if sampling.simulation is not None:
+        simulation = sampling.simulation
+        motions = {name: resolve(motion, "file") for name, motion in simulation.motions.items()}
+        road = None if simulation.road is None else resolve(simulation.road, "file")
+        simulation = simulation.model_copy(update={"motions": motions, "road": road})
+        sampling = sampling.model_copy(update={"simulation": simulation})
     return config.model_copy(
         update={
             "trajectories": resolve(config.trajectories, "file"),

@@ -155,14 +155,71 @@ class InputSection(Section):
         return self
 
 
+class MotionSection(Section):
+    """A motion that an independent coordinate is forced to follow in a simulation: sines of time with random phases, or values of a file."""
+
+    amplitude: Annotated[Number, Field(ge=0)] = 0.0
+    """Amplitude of each sine, rad (m if prismatic)."""
+    frequencies: list[Positive] = []
+    """Frequencies of the sines, Hz."""
+    file: Path | None = None
+    """Table of times, s, and positions, rad (m if prismatic), with a heading for each column; relative to this file."""
+
+    @model_validator(mode="after")
+    def _check_motion(self) -> MotionSection:
+        """Raise ValueError unless either sines or a file are given."""
+        if bool(self.amplitude) != bool(self.frequencies):
+            raise ValueError("amplitude and frequencies belong together; one of them does nothing")
+        if self.frequencies and self.file is not None:
+            raise ValueError("give frequencies or a file, not both")
+        return self
+
+
+class RoadSection(Section):
+    """A road under the wheels of a vehicle at constant speed, which prescribes the heights of massless bodies."""
+
+    tracks: Annotated[
+        list[Annotated[list[Name], Field(min_length=1)]], Field(min_length=1, max_length=2)
+    ]
+    """One or two tracks: the coordinates of heights under the wheels, from front to rear."""
+    distances: Annotated[list[Number], Field(min_length=1)]
+    """Distances of the wheels of a track behind the first wheel, m: 0, then the wheelbase."""
+    speed: Positive
+    """Speed of the vehicle, m/s."""
+    width: Positive | None = None
+    """Distance between the two tracks, m, on which their likeness depends; needed for two tracks without a file."""
+    roughness: Literal["A", "B", "C", "D", "E"] | Positive = "C"
+    """Class of ISO 8608, or spectral density at 0.1 cycles per metre, m^3: a random road for every motion."""
+    file: Path | None = None
+    """Profile instead of a random road: a table of distances and heights, m, one height for each track, with a heading for each column; relative to this file."""
+
+    @model_validator(mode="after")
+    def _check_tracks(self) -> RoadSection:
+        """Raise ValueError if tracks and distances do not fit each other."""
+        if any(len(track) != len(self.distances) for track in self.tracks):
+            raise ValueError(
+                f"each track needs {len(self.distances)} wheels, as many as there are distances"
+            )
+        if any(distance < 0 for distance in self.distances):
+            raise ValueError("distances are behind the first wheel, and so not negative")
+        if len(self.tracks) == 2 and self.width is None and self.file is None:
+            raise ValueError("two tracks need width, the distance between them")
+        return self
+
+
 class SimulationSection(Section):
     """The settings for samples of simulated motions under inputs, for mechanisms that cannot follow every trajectory.
 
-    Coordinates without an input have no torque.
+    Coordinates without an input have no torque. Those with a prescribed motion have the torque that it takes; their
+    accelerations are no result, and acceleration errors leave them out.
     """
 
-    inputs: Annotated[dict[str, InputSection], Field(min_length=1)]
-    """Inputs by the name of the independent coordinate."""
+    inputs: dict[str, InputSection] = {}
+    """Forces by the name of the independent coordinate."""
+    motions: dict[str, MotionSection] = {}
+    """Prescribed motions by the name of the independent coordinate."""
+    road: RoadSection | None = None
+    """Road that prescribes heights under wheels."""
     duration: Span = 10.0
     """Duration of each motion, s."""
     step: Positive = 0.01
@@ -174,7 +231,23 @@ class SimulationSection(Section):
     test_runs: CountOrNone = 10
     """Motions of the test set."""
     start: dict[str, Pair] = {}
-    """[lower, upper] of independent coordinates at the start, at rest, rad (m); where the mechanism is assembled, or zero, if left out."""
+    """[lower, upper] of independent coordinates at the start, rad (m); where the mechanism is assembled, or zero, if left out."""
+    speed: dict[str, Number] = {}
+    """Velocities of independent coordinates at the start, rad/s (m/s); zero if left out."""
+    equilibrium: bool = False
+    """Whether motions begin in the static equilibrium that is nearest to the start."""
+
+    @property
+    def prescribed(self) -> list[str]:
+        """Names of the coordinates that follow a motion."""
+        wheels = [] if self.road is None else [name for track in self.road.tracks for name in track]
+        return [*self.motions, *wheels]
+
+    def list_files(self) -> dict[str, Path]:
+        """Return the files of signals by the coordinate that they move; a road's under ``road``."""
+        files = {name: motion.file for name, motion in self.motions.items()}
+        files |= {"road": None if self.road is None else self.road.file}
+        return {name: path for name, path in files.items() if path is not None}
 
 
 class SamplingSection(Section):

@@ -222,9 +222,7 @@ class _Copy:
 
     def _write_placement(self, at: Any) -> Any:
         """Return a point, a named point or a list of steps, mirrored."""
-        if isinstance(at, list) and any(
-            isinstance(step, dict | list | str) and not _is_number(step) for step in at
-        ):
+        if isinstance(at, list) and any(isinstance(step, dict) for step in at):
             return [self._write_step(step) for step in at]
         if isinstance(at, list):
             return self._mirror_vector(at)

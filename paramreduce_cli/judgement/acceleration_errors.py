@@ -7,7 +7,7 @@ import numpy as np
 
 from paramreduce_cli.judgement.torque_errors import compute_joint_errors
 from paramreduce_cli.multibody.dynamics import SINGULAR_MASS
-from paramreduce_cli.records import Block, FloatArray
+from paramreduce_cli.records import Block, BoolArray, FloatArray
 
 Direct = Callable[[FloatArray, FloatArray, FloatArray], tuple[FloatArray, FloatArray]]
 """Generalised coordinates, velocities and the parameters of models to their M and delta."""
@@ -42,6 +42,12 @@ class AccelerationErrors:
         return compute_joint_errors([self])
 
 
+def split_prescribed(nominal_acceleration: FloatArray) -> tuple[BoolArray, BoolArray]:
+    """Return masks of the coordinates whose accelerations are a result, and of those whose motion is prescribed, (n_dof,) each."""
+    free = np.isfinite(nominal_acceleration)
+    return free, ~free
+
+
 def compute_acceleration_errors(
     blocks: Iterable[Block],
     direct: Direct,
@@ -54,13 +60,15 @@ def compute_acceleration_errors(
         blocks: The samples.
         direct: Mass matrices and biases of models.
         parameters: Parameters, one column per model, zero for dropped ones, (n_parameters, n_models).
-        nominal_acceleration: Divisor of the errors of each coordinate, (n_dof,).
+        nominal_acceleration: Divisor of the errors of each coordinate, (n_dof,); infinite for coordinates whose motion is
+            prescribed: their accelerations are given, and mass matrices are those of the others.
 
     Returns:
         Errors; infinite where a mass matrix is singular at some sample.
     """
     n_models, n_dof = parameters.shape[1], nominal_acceleration.size
     squares, total = np.zeros((n_models, n_dof)), np.zeros(n_dof)
+    free, held = (np.flatnonzero(some) for some in split_prescribed(nominal_acceleration))
     condition, smallest = np.zeros(n_models), np.full(n_models, np.inf)
     step = max(1, _VALUES_AT_ONCE // (n_models * n_dof * n_dof))
     for block in blocks:
@@ -68,6 +76,9 @@ def compute_acceleration_errors(
             part = slice(start, start + step)
             found = direct(block.q[part], block.dq[part], parameters)
             M, bias = (np.moveaxis(values, -1, 1) for values in found)
+            given = (M[..., held] @ block.ddz[part][:, None, held, None])[..., 0]
+            right = (block.tau[part][:, None, :] - bias - given)[..., free, None]
+            M = M[..., free, :][..., free]
             values = np.linalg.eigvalsh(M)
             sizes = np.abs(values)
             largest = sizes.max(axis=2)
@@ -75,10 +86,9 @@ def compute_acceleration_errors(
                 largest, np.finfo(float).tiny
             )
             M[singular] = np.nan
-            right = (block.tau[part][:, None, :] - bias)[..., None]
             ddz = np.linalg.solve(M, right)[..., 0]
-            error = (ddz - block.ddz[part][:, None, :]) / nominal_acceleration
-            squares += np.where(np.isnan(error), np.inf, error**2).sum(axis=0)
+            error = (ddz - block.ddz[part][:, None, free]) / nominal_acceleration[free]
+            squares[:, free] += np.where(np.isnan(error), np.inf, error**2).sum(axis=0)
             total += np.sum((block.ddz[part] / nominal_acceleration) ** 2, axis=0)
             ratio = np.where(singular, np.inf, largest / np.where(singular, 1.0, sizes.min(axis=2)))
             condition = np.maximum(condition, ratio.max(axis=0))

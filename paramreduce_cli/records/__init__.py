@@ -77,7 +77,16 @@ from paramreduce_cli.records.reduction import (
     Subsets,
 )
 from paramreduce_cli.records.run import Progress, ProgressCallback, Provenance, Report, Run, Stored
-from paramreduce_cli.records.samples import SETS, Block, Recording, Recordings, Samples, SampleSet
+from paramreduce_cli.records.samples import (
+    SETS,
+    Block,
+    Recording,
+    Recordings,
+    Samples,
+    SampleSet,
+    SignalTable,
+    SignalTables,
+)
 from paramreduce_cli.records.terms import (
     NO_OPERAND,
     TERMS,

@@ -1,6 +1,6 @@
 """Samples: states, torques and observation matrices."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import ClassVar, Protocol
 
 from paramreduce_cli.records.arrays import FloatArray, IntArray
@@ -29,6 +29,25 @@ class Recordings:
     estimation: Recording | None
     validation: Recording | None
     test: Recording | None
+
+
+@record
+class SignalTable:
+    """Signals from a file."""
+
+    source: str
+    """Name of the file."""
+    arguments: FloatArray
+    """Times, s, or distances, m, ascending, (n_points,)."""
+    values: FloatArray
+    """Values, (n_points, n_columns)."""
+
+
+@record
+class SignalTables:
+    """Signals from the user's files, by coordinate; a road's profile under ``road``."""
+
+    tables: Mapping[str, SignalTable]
 
 
 @record

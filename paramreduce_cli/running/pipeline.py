@@ -25,6 +25,7 @@ from paramreduce_cli.records import (
     Report,
     Run,
     Samples,
+    SignalTables,
     TermReduction,
     Trajectories,
     Validation,
@@ -158,6 +159,8 @@ def list_user_files(config: Config | None, kind: type) -> dict[str, Path]:
         files = {"coefficients": config.trajectories.file}
     elif config is not None and kind is Recordings:
         files = config.sampling.list_recordings()
+    elif config is not None and kind is SignalTables and config.sampling.simulation is not None:
+        files = {**config.sampling.simulation.list_files()}
     elif config is not None and kind is RawLogs and config.sampling.log is not None:
         log = config.sampling.log
         files = {
@@ -176,6 +179,7 @@ _NAMED_BY = {
     Coefficients: "trajectories.file",
     Recordings: "sampling.estimation_file, validation_file and test_file",
     RawLogs: "sampling.log.files and held_out",
+    SignalTables: "sampling.simulation.motions and road",
 }
 """Keys of files that users bring."""
 

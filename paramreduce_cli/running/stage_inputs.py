@@ -8,7 +8,7 @@ from typing import Any
 
 from paramreduce_cli.artifacts.log_files import load_recorded
 from paramreduce_cli.artifacts.store import digest_file
-from paramreduce_cli.artifacts.user_files import load_coefficients, load_recording
+from paramreduce_cli.artifacts.user_files import load_coefficients, load_recording, load_signals
 from paramreduce_cli.config import Config
 from paramreduce_cli.config.error_keys import locate_error
 from paramreduce_cli.errors import NumericalError, ParamreduceWarning
@@ -21,6 +21,7 @@ from paramreduce_cli.records import (
     RawLogs,
     Recording,
     Recordings,
+    SignalTables,
 )
 from paramreduce_cli.running.pipeline import Stage, list_user_files
 
@@ -128,9 +129,16 @@ def _load_recordings(inputs: Inputs) -> Recordings:
     return Recordings(**found)
 
 
+def _load_signals(inputs: Inputs) -> SignalTables:
+    """Return the signals of files that the config names, by coordinate."""
+    files = inputs.note_files(SignalTables)
+    return SignalTables({name: load_signals(path) for name, path in files.items()})
+
+
 OUTSIDE: dict[type, Callable[[Inputs], Any]] = {
     Coefficients: _load_coefficients,
     Recordings: _load_recordings,
     RawLogs: _load_logs,
+    SignalTables: _load_signals,
 }
 """What stages read from files of the user's own."""

@@ -11,6 +11,7 @@ import numpy as np
 
 from paramreduce_cli.config.schema import ReductionSection, Stop
 from paramreduce_cli.errors import ConfigError, DataError, ParamreduceWarning
+from paramreduce_cli.judgement.acceleration_errors import split_prescribed
 from paramreduce_cli.judgement.torque_errors import NormErrors, compute_torque_errors
 from paramreduce_cli.lean.counting import Counts
 from paramreduce_cli.multibody.dynamics import Dynamics
@@ -225,7 +226,10 @@ def _make_criterion_inputs(
             for key in ("q", "dq", "ddz", "tau")
         )
         A, B = direct(q, dq, columns.expansion)
-        return AccelerationData(A, B, tau, ddz, nominal)
+        free, held = split_prescribed(nominal)
+        B = B + np.einsum("sijp,sj->sip", A[:, :, held], ddz[:, held])
+        A = A[:, free][:, :, free]
+        return AccelerationData(A, B[:, free], tau[:, free], ddz[:, free], nominal[free])
 
     def cost(kept: IntArray) -> int:
         """Operations of the lean inverse dynamics, nearly."""

@@ -5,12 +5,12 @@ import warnings
 import zlib
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
-from functools import lru_cache
+from functools import cache, lru_cache, partial
 from typing import Any
 
 import numpy as np
 
-from paramreduce_cli.config.schema import InputSection, SamplingSection, SimulationSection
+from paramreduce_cli.config.schema import SamplingSection, SimulationSection
 from paramreduce_cli.errors import ConfigError, DataError, ParamreduceWarning
 from paramreduce_cli.excitation.fourier import (
     FINER,
@@ -20,11 +20,12 @@ from paramreduce_cli.excitation.fourier import (
     shift_start,
 )
 from paramreduce_cli.excitation.point_to_point import evaluate_along
+from paramreduce_cli.excitation.simulated_inputs import make_inputs
 from paramreduce_cli.excitation.simulation import (
-    Input,
     MassAndBias,
     SimulatedMotion,
     TextbookMassAndBias,
+    find_equilibrium,
     simulate,
 )
 from paramreduce_cli.excitation.symmetry import complete_series, generate_group
@@ -59,6 +60,7 @@ from paramreduce_cli.records import (
     Run,
     Samples,
     SampleSet,
+    SignalTables,
     Trajectories,
 )
 from paramreduce_cli.reduction.models import make_full_model
@@ -76,6 +78,7 @@ def sample(
     trajectories: Trajectories | None,
     recordings: Recordings,
     log: MeasuredLog | None = None,
+    signals: SignalTables | None = None,
     report_progress: ProgressCallback = lambda _: None,
     items: Items | None = None,
 ) -> Samples:
@@ -95,6 +98,7 @@ def sample(
             ("sampling", "log"),
         )
     dynamics = Dynamics(model.mechanism)
+    direct = cache(partial(_choose_forward_dynamics, model, dynamics))
 
     def make_set(name: str, points: int | None) -> ComputedSet:
         """Return a set from the log, the simulation, a recording or the trajectories; None if there is none."""
@@ -102,7 +106,9 @@ def sample(
         if sampling.log is not None:
             return _sample_log(model, dynamics, log, name)
         if sampling.simulation is not None:
-            return _sample_simulation(sampling.simulation, model, dynamics, name, report_progress)
+            return _sample_simulation(
+                sampling.simulation, model, dynamics, direct(), signals, name, report_progress
+            )
         if recording is not None:
             return _sample_recording(sampling, model, dynamics, recording)
         if trajectories is None:
@@ -302,6 +308,8 @@ def _sample_simulation(
     section: SimulationSection,
     model: Model,
     dynamics: Dynamics,
+    direct: MassAndBias,
+    signals: SignalTables | None,
     name: str,
     report_progress: ProgressCallback,
 ) -> ObservedSet:
@@ -313,20 +321,24 @@ def _sample_simulation(
     mechanism = model.mechanism
     rng = np.random.default_rng([0, zlib.crc32(name.encode())])
     time = np.arange(0.0, section.duration, section.step)
-    z = np.zeros(mechanism.n_dof)
+    names, tables = mechanism.coordinate_names, signals or SignalTables({})
+    z, speed = np.zeros(mechanism.n_dof), np.zeros(mechanism.n_dof)
+    for coordinate, value in section.speed.items():
+        speed[names.index(coordinate)] = value
     if mechanism.loops is not None:
         z = mechanism.loops.assembly[list(mechanism.independent)]
-    direct = _choose_forward_dynamics(model, dynamics)
     motions: list[SimulatedMotion] = []
     counts = (section.runs, section.validation_runs, section.test_runs)
     runs = dict(zip(SETS, counts, strict=True))[name]
     for done in range(runs):
-        inputs = [_make_input(section.inputs.get(c), rng) for c in mechanism.coordinate_names]
         start = z.copy()
         for coordinate, (lower, upper) in section.start.items():
-            start[mechanism.coordinate_names.index(coordinate)] = rng.uniform(lower, upper)
+            start[names.index(coordinate)] = rng.uniform(lower, upper)
         try:
-            motions.append(simulate(direct, inputs, start, time))
+            inputs = make_inputs(section, names, tables, rng)
+            if section.equilibrium:
+                start = find_equilibrium(direct, inputs, start)
+            motions.append(simulate(direct, inputs, start, speed, time))
         except DataError as error:
             raise ConfigError(f"{name} set: {error}", ("sampling", "simulation")) from error
         report_progress(Progress(f"simulate motions of the {name} set", done + 1, runs))
@@ -343,15 +355,6 @@ def _choose_forward_dynamics(model: Model, dynamics: Dynamics) -> MassAndBias:
     """Return the mass matrix and bias of the full model: compiled code, or the regressor without a compiler."""
     compiled = CompiledForwardDynamics(model, make_full_model(model))
     return compiled if compiled.is_compiled else TextbookMassAndBias(dynamics, model.values)
-
-
-def _make_input(section: InputSection | None, rng: np.random.Generator) -> Input:
-    """Return an input with random phases."""
-    if section is None:
-        return Input()
-    phases = rng.uniform(0, 2 * np.pi, len(section.frequencies)).tolist()
-    given = section.model_dump() | {"frequencies": tuple(section.frequencies)}
-    return Input(phases=tuple(phases), **given)
 
 
 def _read_motion_states(motions: list[SimulatedMotion]) -> StatesAt:
@@ -482,6 +485,9 @@ def _compute_nominal_acceleration(
     if given != "standard-deviation":
         return expand_per_joint(given, model.mechanism.n_dof)
     deviation = compute_standard_deviation(block.ddz for block in estimation.iterate_states())
+    if sampling.simulation is not None:
+        names = model.mechanism.coordinate_names
+        deviation[[names.index(name) for name in sampling.simulation.prescribed]] = np.inf
     if deviation.any():
         # Of a joint that never moves in a recording there is no scale, and no error to divide by it.
         deviation[deviation == 0] = 1.0

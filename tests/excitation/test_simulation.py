@@ -6,7 +6,8 @@ from conftest import TWO_LINK, config_and_model
 from oracles.lagrange import Lagrange, forward_dynamics
 from scipy.integrate import simpson
 
-from paramreduce_cli.excitation.simulation import Input, TextbookMassAndBias, simulate
+from paramreduce_cli.excitation.signals import Harmonics, Joined
+from paramreduce_cli.excitation.simulation import Inputs, TextbookMassAndBias, simulate
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.multibody.loops.coordinates import Coordinates
 from paramreduce_cli.records import Recordings
@@ -64,11 +65,13 @@ def test_energy_is_what_inputs_brought_and_friction_took():
     _, model = config_and_model("cart_pole", *SHORT)
     mechanism, oracle = model.mechanism, Lagrange(model.mechanism)
     time = np.linspace(0, 2, 2001)
-    push = Input(amplitude=2.0, frequencies=(0.7, 1.9), phases=(0.3, 1.0), stiffness=5, damping=1)
+    waves = np.array([2 * np.exp(1j * np.array([0.3, 1.0])), [0, 0]])
+    none = np.empty(0, dtype=np.int64)
+    forces = Harmonics(2 * np.pi * np.array([0.7, 1.9]), waves)
+    push = Inputs(forces, np.array([5.0, 0]), np.array([1.0, 0]), np.zeros(2), none, Joined([]))
     start = np.array([0.1, 0.8])
-    motion = simulate(
-        TextbookMassAndBias(Dynamics(mechanism), model.values), [push, Input()], start, time
-    )
+    direct = TextbookMassAndBias(Dynamics(mechanism), model.values)
+    motion = simulate(direct, push, start, np.zeros(2), time)
     n = time.size
     states = motion.z.T, motion.dz.T, np.zeros_like(motion.dz.T)
     phi = np.tile(model.values, (n, 1)).T
