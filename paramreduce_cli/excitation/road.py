@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.special import k1
 
-from paramreduce_cli.excitation.signals import Harmonics
+from paramreduce_cli.excitation.input_signals import Harmonics
 
 ROUGHNESS = {"A": 16e-6, "B": 64e-6, "C": 256e-6, "D": 1024e-6, "E": 4096e-6}
 """Spectral densities G(n0) of the classes, geometric means, m^3."""

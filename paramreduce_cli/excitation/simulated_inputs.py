@@ -6,8 +6,8 @@ import numpy as np
 
 from paramreduce_cli.config.schema import InputSection, RoadSection, SimulationSection
 from paramreduce_cli.errors import DataError
+from paramreduce_cli.excitation.input_signals import Harmonics, Interpolated, Joined, Signals
 from paramreduce_cli.excitation.road import ROUGHNESS, draw_road
-from paramreduce_cli.excitation.signals import Harmonics, Interpolated, Joined, Signals
 from paramreduce_cli.excitation.simulation import Inputs
 from paramreduce_cli.records import FloatArray, SignalTable, SignalTables
 

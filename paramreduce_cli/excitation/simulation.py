@@ -13,12 +13,12 @@ import numpy as np
 import scipy  # whose integrate is loaded when it is used
 
 from paramreduce_cli.errors import DataError
-from paramreduce_cli.excitation.signals import Harmonics, Joined, Signals
+from paramreduce_cli.excitation.input_signals import Harmonics, Joined, Signals
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.multibody.loops.coordinates import Coordinates
 from paramreduce_cli.records import FloatArray, IntArray
 
-_TOLERANCE = 1e-8
+_TOLERANCE = 1e-6
 """Tolerance of the integration, relative and absolute; it moves the path, not the fit of its samples."""
 _MOST_EVALUATIONS = 100
 """Most evaluations of the dynamics for each sample, on average; a dozen are usual."""

@@ -5,93 +5,50 @@ from __future__ import annotations
 import ctypes
 import time
 import warnings
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
 from paramreduce_cli.errors import DataError, ParamreduceWarning
 from paramreduce_cli.export.code_generation import Exported, make_exported_model
 from paramreduce_cli.export.exported_model import ExportedModel
-from paramreduce_cli.export.languages import languages
 from paramreduce_cli.expressions.compiled import get_address, load
-from paramreduce_cli.expressions.functions import Argument
-from paramreduce_cli.records import FloatArray, LoopEvaluation, Model, ReducedModel, Speed
+from paramreduce_cli.expressions.functions import Argument, Function
+from paramreduce_cli.records import (
+    FloatArray,
+    LoopEvaluation,
+    Mechanism,
+    Model,
+    ReducedModel,
+    Speed,
+)
 
 _ROUNDS, _TURNS = 20, 9
 """Evaluations of every state in one go, and how often each model is timed."""
 
-_LOOP = """
-void repeated(long rounds, long n, const double *phi, const double *const *in, double *const *out) {{
+_REPEATED = """
+void repeat_{function}(long rounds, long n, const double *phi, const double *const *in, double *const *out) {{
+  (void)phi;
   for (long r = 0; r < rounds; ++r)
     for (long k = 0; k < n; ++k)
-      {name}(phi, {arrays});
+      {stem}_{function}({arguments});
 }}
 """
-
-
 _LOOPS = """
-void repeated(long rounds, long n, const double *q, const double *z, const double *dz, const double *ddz) {{
+void repeat_states(long rounds, long n, const double *q, const double *z, const double *dz, const double *ddz) {{
   double guess[{n_q}], R[{n_R}], b[{n_d}], dq[{n_q}], ddq[{n_q}];
   for (long r = 0; r < rounds; ++r)
     for (long k = 0; k < n; ++k) {{
       for (int i = 0; i < {n_q}; ++i) guess[i] = q[k * {n_q} + i];
       for (int i = 0; i < {n_R}; ++i) R[i] = 0;
-      {name}(z + k * {n_z}, dz + k * {n_z}, ddz + k * {n_z}, 0, guess, R, b, dq, ddq);
+      {stem}_states(z + k * {n_z}, dz + k * {n_z}, ddz + k * {n_z}, 0, guess, R, b, dq, ddq);
     }}
 }}
 """
-
-
-def evaluate_loops(
-    model: Model,
-    running: Mapping[str, RunningModel],
-    q: FloatArray,
-    dz: FloatArray,
-    ddz: FloatArray,
-) -> LoopEvaluation:
-    """Count and time what a controller evaluates for closed loops.
-
-    Args:
-        model: Model of the robot.
-        running: Inverse dynamics of some models by name, the full one first.
-        q: Coordinates that close the loops, (n_states, n_q).
-        dz: Velocities of the independent coordinates, (n_states, n_dof).
-        ddz: Accelerations, same shape.
-    """
-    exported = next(iter(running.values())).exported
-    newton, velocities, accelerations, rates = (
-        function.program.n_operations for function in exported.loop_problems
-    )
-    stem, text = _write_source(exported)
-    n_q, n_z = model.mechanism.n_q, model.mechanism.n_dof
-    sizes = {"n_q": n_q, "n_z": n_z, "n_d": n_q - n_z, "n_R": (n_q - n_z) * n_z}
-    library = load(text + _LOOPS.format(name=f"{stem}_states", **sizes))
-    seconds = None
-    if library is not None:
-        z = q[:, list(model.mechanism.independent)]
-        arrays = [np.ascontiguousarray(x) for x in (q, z, dz, ddz)]
-        pointers = [ctypes.c_void_p(x.ctypes.data) for x in arrays]
-        timings = []
-        for _ in range(_TURNS):
-            started = time.perf_counter()
-            library.repeated(ctypes.c_long(_ROUNDS), ctypes.c_long(len(q)), *pointers)
-            timings.append((time.perf_counter() - started) / _ROUNDS / len(q))
-        seconds = min(timings)
-    inverse = {name: one.n_operations for name, one in running.items()}
-    return LoopEvaluation(newton, velocities, accelerations, rates, inverse, seconds)
-
-
-def _write_source(exported: ExportedModel) -> tuple[str, str]:
-    """Return the prefix of the functions' names, and the C source with its header."""
-    files: dict[str, bytes] = languages["c"](exported)
-    stem = next(file[:-2] for file in files if file.endswith(".h"))
-    header, source = (files[f"{stem}.{end}"].decode() for end in ("h", "c"))
-    return stem, header + source.replace(f'#include "{stem}.h"', "")
-
-
 _EVALUATION = """
 int evaluate(const double *phi, const double *z, const double *dz, double *q, double *R, double *M, double *delta) {{
   double b[{n_d}], dq[{n_q}], ddq[{n_q}], ddz[{n_z}];
+  (void)phi;
   for (int i = 0; i < {n_z}; ++i) ddz[i] = 0;
   if ({stem}_states(z, dz, ddz, 0, q, R, b, dq, ddq) < 0) return -1;
   {stem}_direct_dynamics({arguments}, M, delta);
@@ -100,73 +57,66 @@ int evaluate(const double *phi, const double *z, const double *dz, double *q, do
 """
 
 
-class CompiledForwardDynamics:
-    """The mass matrix and bias of a model at single states, from its exported C code.
+class CompiledModel:
+    """The inverse and direct dynamics of a model, from its exported C code.
 
-    Loops are followed from the last state.
+    Args:
+        mechanism: Mechanism of the robot.
+        exported: The model.
+    """
+
+    def __init__(self, mechanism: Mechanism, exported: ExportedModel) -> None:
+        self.mechanism, self.exported = mechanism, exported
+        self.phi = np.array([parameter.value for parameter in exported.parameters])
+        self.library = load(self._write_source())
+        """The compiled code; None without a compiler."""
+
+    def _write_source(self) -> str:
+        """Return the C source with its header, and the loops that are called from here."""
+        from paramreduce_cli.export.languages.c import write_scalar_source  # late: loads templates
+
+        exported = self.exported
+        stem, source = write_scalar_source(exported)
+        parts = [source]
+        for function in exported.functions:
+            states = iter(a for a in function.arguments if a.name != "phi")
+            texts = {a.name: f"in[{i}] + k * {a.size}" for i, a in enumerate(states)}
+            given = [texts.get(a.name, "phi") for a in function.arguments]
+            given += [f"out[{i}] + k * {a.size}" for i, a in enumerate(function.results)]
+            fields = {"stem": stem, "function": function.name, "arguments": ", ".join(given)}
+            parts.append(_REPEATED.format(**fields))
+        if self.mechanism.loops is not None:
+            n_q, n_z = self.mechanism.n_q, self.mechanism.n_dof
+            sizes = {"n_q": n_q, "n_z": n_z, "n_d": n_q - n_z, "n_R": (n_q - n_z) * n_z}
+            parts.append(_LOOPS.format(stem=stem, **sizes))
+            for function in exported.functions:
+                if function.name == "direct_dynamics":
+                    names = ", ".join(argument.name for argument in function.arguments)
+                    parts.append(_EVALUATION.format(stem=stem, arguments=names, **sizes))
+        return "".join(parts)
+
+    def get_function(self, name: str) -> Function:
+        """Return one of the model's functions by name."""
+        return next(function for function in self.exported.functions if function.name == name)
+
+
+def compile_model(
+    model: Model, chosen: ReducedModel, what: Exported = Exported.BOTH
+) -> CompiledModel:
+    """Return a model's functions, compiled.
 
     Args:
         model: Model of the robot.
-        chosen: The model, with expressions.
+        chosen: The model.
+        what: Functions to compile.
+
+    Raises:
+        FormulationError: The functions do not compute what the straightforward model does.
     """
-
-    def __init__(self, model: Model, chosen: ReducedModel) -> None:
-        mechanism = model.mechanism
-        self._mechanism, self._phi = mechanism, np.ascontiguousarray(chosen.values)
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", ParamreduceWarning)
-            exported = make_exported_model(model, chosen, title="", what=Exported.DDM)
-        stem, text = _write_source(exported)
-        (direct,) = exported.functions
-        n_q, n_z = mechanism.n_q, mechanism.n_dof
-        if mechanism.loops is not None:
-            names = ", ".join(argument.name for argument in direct.arguments)
-            sizes = {"n_q": n_q, "n_z": n_z, "n_d": n_q - n_z}
-            text += _EVALUATION.format(stem=stem, arguments=names, **sizes)
-        self._library = load(text)
-        self._direct = f"{stem}_direct_dynamics"
-        self._arguments = [argument.name for argument in direct.arguments]
-        self._q, self._R = np.empty(n_q), np.empty((n_q - n_z, n_z))
-        self._M, self._delta = np.empty((n_z, n_z)), np.empty(n_z)
-        self.restart()
-
-    @property
-    def is_compiled(self) -> bool:
-        """Whether there is compiled code; without a compiler it cannot be called."""
-        return self._library is not None
-
-    def restart(self) -> None:
-        """Follow the loops from the assembly again, instead of from the last state."""
-        if self._mechanism.loops is not None:
-            self._q[:] = self._mechanism.loops.assembly
-            self._R[:] = 0.0
-
-    def __call__(self, z: FloatArray, dz: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return M, (n_dof, n_dof), and delta, (n_dof,), at positions z and velocities dz, (n_dof,) each.
-
-        Raises:
-            DataError: The loops cannot be closed.
-        """
-        assert self._library is not None
-        arrays = {
-            "phi": self._phi,
-            "q": z,
-            "dq": dz,
-            "z": z,
-            "dz": dz,
-            "M": self._M,
-            "delta": self._delta,
-        }
-        names = [*self._arguments, "M", "delta"]
-        function = getattr(self._library, self._direct)
-        if self._mechanism.loops is not None:
-            arrays |= {"q": self._q, "R": self._R}
-            names = ["phi", "z", "dz", "q", "R", "M", "delta"]
-            function = self._library.evaluate
-        failed = function(*(ctypes.c_void_p(get_address(arrays[name])) for name in names))
-        if self._mechanism.loops is not None and failed:
-            raise DataError("the loops cannot be closed")
-        return self._M, self._delta
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ParamreduceWarning)  # what is unsafe is said elsewhere
+        exported = make_exported_model(model, chosen, title="", what=what)
+    return CompiledModel(model.mechanism, exported)
 
 
 class RunningModel:
@@ -175,24 +125,12 @@ class RunningModel:
     Without a compiler the model's expressions are evaluated in Python.
 
     Args:
-        model: Model of the robot.
-        chosen: The model.
-        what: Function to run.
+        compiled: The model.
+        name: Function to run: ``inverse_dynamics`` or ``direct_dynamics``.
     """
 
-    def __init__(self, model: Model, chosen: ReducedModel, what: Exported = Exported.IDM) -> None:
-        self._phi = np.ascontiguousarray(chosen.values)
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", ParamreduceWarning)  # nothing is simulated with it
-            self.exported = make_exported_model(model, chosen, title="", what=what)
-        (self._function,) = self.exported.functions
-        stem, text = _write_source(self.exported)
-        sides = {"in": self._states, "out": self._function.results}
-        arrays = (
-            f"{s}[{i}] + k * {a.size}" for s, side in sides.items() for i, a in enumerate(side)
-        )
-        name = f"{stem}_{self._function.name}"
-        self._library = load(text + _LOOP.format(name=name, arrays=", ".join(arrays)))
+    def __init__(self, compiled: CompiledModel, name: str) -> None:
+        self._compiled, self._function = compiled, compiled.get_function(name)
 
     @property
     def _states(self) -> list[Argument]:
@@ -211,7 +149,7 @@ class RunningModel:
     @property
     def language(self) -> str:
         """Language that the functions run in."""
-        return "C" if self._library is not None else "Python"
+        return "C" if self._compiled.library is not None else "Python"
 
     def __call__(self, *states: FloatArray, repetitions: int = 1) -> FloatArray:
         """Results for some states, (n_states, n): torques, or mass matrices row by row and then delta.
@@ -222,15 +160,16 @@ class RunningModel:
         """
         count = len(states[0])
         arrays = [np.ascontiguousarray(x).reshape(count, -1) for x in states]
-        if self._library is None:
-            inputs = [np.broadcast_to(value, count) for value in self._phi]
+        phi, library = self._compiled.phi, self._compiled.library
+        if library is None:
+            inputs = [np.broadcast_to(value, count) for value in phi]
             inputs += [column for array in arrays for column in array.T]
             return np.column_stack(self._function.program.evaluate(inputs))
         results = [np.empty((count, result.size)) for result in self._function.results]
-        self._library.repeated(
+        getattr(library, f"repeat_{self._function.name}")(
             ctypes.c_long(repetitions),
             ctypes.c_long(count),
-            ctypes.c_void_p(self._phi.ctypes.data),
+            ctypes.c_void_p(phi.ctypes.data),
             *(
                 (ctypes.c_void_p * len(some))(*(x.ctypes.data for x in some))
                 for some in (arrays, results)
@@ -241,10 +180,88 @@ class RunningModel:
     def measure_time(self, *states: FloatArray) -> float:
         """Return the mean time of one evaluation over some states, s."""
         self(*states)
-        repetitions = _ROUNDS if self._library is not None else 1
+        repetitions = _ROUNDS if self._compiled.library is not None else 1
         started = time.perf_counter()
         self(*states, repetitions=repetitions)
         return (time.perf_counter() - started) / repetitions / len(states[0])
+
+
+class CompiledForwardDynamics:
+    """The mass matrix and bias of a compiled model at single states; loops are followed from the last state.
+
+    Args:
+        compiled: The model, with its direct dynamics.
+    """
+
+    def __init__(self, compiled: CompiledModel) -> None:
+        mechanism = self._mechanism = compiled.mechanism
+        n_q, n_z = mechanism.n_q, mechanism.n_dof
+        self._phi = compiled.phi
+        self._q, self._R = np.empty(n_q), np.empty((n_q - n_z, n_z))
+        self._M, self._delta = np.empty((1, n_z, n_z)), np.empty((1, n_z))
+        self._direct = RunningModel(compiled, "direct_dynamics")
+        self._evaluate: Callable[..., int] | None = None
+        if compiled.library is not None and mechanism.loops is not None:
+            self._evaluate = compiled.library.evaluate
+        self.restart()
+
+    def restart(self) -> None:
+        """Follow the loops from the assembly again, instead of from the last state."""
+        if self._mechanism.loops is not None:
+            self._q[:] = self._mechanism.loops.assembly
+            self._R[:] = 0.0
+
+    def __call__(self, z: FloatArray, dz: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return M, (n_dof, n_dof), and delta, (n_dof,), at positions z and velocities dz, (n_dof,) each.
+
+        Raises:
+            DataError: The loops cannot be closed.
+        """
+        n = z.size
+        if self._evaluate is None:
+            given = {"q": z[None], "dq": dz[None]}
+            (row,) = self._direct(*(given[name] for name in self._direct.takes))
+            return row[: n * n].reshape(n, n), row[n * n :]
+        arrays = (self._phi, z, dz, self._q, self._R, self._M, self._delta)
+        if self._evaluate(*(ctypes.c_void_p(get_address(array)) for array in arrays)):
+            raise DataError(
+                "the loops cannot be closed: the mechanism comes to a singular configuration or to the "
+                "end of its reach"
+            )
+        return self._M[0], self._delta[0]
+
+
+def evaluate_loops(
+    compiled: Mapping[str, CompiledModel], q: FloatArray, dz: FloatArray, ddz: FloatArray
+) -> LoopEvaluation:
+    """Count and time what a controller evaluates for closed loops.
+
+    Args:
+        compiled: Some models by name, the full one first.
+        q: Coordinates that close the loops, (n_states, n_q).
+        dz: Velocities of the independent coordinates, (n_states, n_dof).
+        ddz: Accelerations, same shape.
+    """
+    first = next(iter(compiled.values()))
+    newton, velocities, accelerations, rates = (
+        function.program.n_operations for function in first.exported.loop_problems
+    )
+    seconds = None
+    if first.library is not None:
+        z = q[:, list(first.mechanism.independent)]
+        arrays = [np.ascontiguousarray(x) for x in (q, z, dz, ddz)]
+        pointers = [ctypes.c_void_p(x.ctypes.data) for x in arrays]
+        timings = []
+        for _ in range(_TURNS):
+            started = time.perf_counter()
+            first.library.repeat_states(ctypes.c_long(_ROUNDS), ctypes.c_long(len(q)), *pointers)
+            timings.append((time.perf_counter() - started) / _ROUNDS / len(q))
+        seconds = min(timings)
+    inverse = {
+        name: one.get_function("inverse_dynamics").program.n_operations
+        for name, one in compiled.items()
+    }
+    return LoopEvaluation(newton, velocities, accelerations, rates, inverse, seconds)
 
 
 def measure_speeds(models: Mapping[str, RunningModel], states: Mapping[str, FloatArray]) -> Speed:

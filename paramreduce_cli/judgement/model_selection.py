@@ -18,6 +18,8 @@ from paramreduce_cli.texts import EXACT
 Pick = tuple[str, int]
 """A heuristic, and the row of one of its subsets."""
 
+_MANY, _SOME, _NEAR = 70, 16, 2
+"""Models of a curve from which on only some are shown, how many, and the sizes around the selected one that always are."""
 _BOTH_SETS = ("estimation", "validation")
 _PARTS = {"torque_error": _BOTH_SETS, "acceleration_error": _BOTH_SETS, "operations": ("inverse",)}
 """What tolerances are on: sets of samples, or functions."""
@@ -155,15 +157,25 @@ def list_shown_models(
         front: Models of the Pareto front.
 
     Returns:
-        All sizes of the selected heuristic and of forward selection, the selected size of every heuristic, and the front.
+        Sizes of the selected heuristic and of forward selection, the selected size of every heuristic, and the front. Of many
+        sizes or models some are left out, but not those near the selected one.
     """
-    whole = {selected.heuristic, "forward-selection"}
-    shown = [
-        choice
-        for choice in list_models(results)
-        if choice.heuristic in whole or choice.n == selected.n
+    curves = [
+        [ModelChoice(name, n) for n in results[name].n.tolist()]
+        for name in dict.fromkeys([selected.heuristic, "forward-selection"])
+        if name in results
     ]
-    return list(dict.fromkeys([*shown, *front]))
+    beside = [choice for choice in list_models(results) if choice.n == selected.n]
+    thinned = [one for curve in (*curves, front) for one in _thin_out(curve, selected.n)]
+    return list(dict.fromkeys([*thinned, *beside]))
+
+
+def _thin_out(choices: Sequence[ModelChoice], n: int) -> list[ModelChoice]:
+    """Return some of many models: those near a size, and others at equal steps, the first and the last among them."""
+    if len(choices) <= _MANY:
+        return list(choices)
+    steps = set(np.linspace(0, len(choices) - 1, _SOME).round().astype(int).tolist())
+    return [one for k, one in enumerate(choices) if k in steps or abs(one.n - n) <= _NEAR]
 
 
 def _round_off(value: float) -> float:

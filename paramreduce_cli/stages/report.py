@@ -13,10 +13,17 @@ from paramreduce_cli.config.schema import (
     SelectedSection,
 )
 from paramreduce_cli.errors import ConfigError, DataError, FormulationError, ParamreduceWarning
-from paramreduce_cli.export.code_generation import Exported, make_exported_model
+from paramreduce_cli.export.code_generation import make_exported_model
+from paramreduce_cli.export.exported_model import ExportedModel
 from paramreduce_cli.export.languages import languages
 from paramreduce_cli.export.named_models import find_chosen_model
-from paramreduce_cli.export.running import RunningModel, evaluate_loops, measure_speeds
+from paramreduce_cli.export.running import (
+    CompiledModel,
+    RunningModel,
+    compile_model,
+    evaluate_loops,
+    measure_speeds,
+)
 from paramreduce_cli.fields.section import expand_per_joint
 from paramreduce_cli.judgement.leanest import find_leanest
 from paramreduce_cli.judgement.verdict import find_unsafe_models
@@ -86,8 +93,12 @@ def report(
     judged = validation.heuristics[selected.heuristic]
     shown = samples.validation if samples.validation is not None else samples.estimation
     motion = find_first_motion(shown.iterate_blocks(), selected.model)
-    running = _compile_models(model, selected, Exported.IDM)
-    direct = _compile_models(model, selected, Exported.DDM) if running else {}
+    exported = _export_selected(model, reduction, validation, provenance)
+    compiled = _compile_models(model, selected, exported)
+    running, direct = (
+        {title: RunningModel(one, name) for title, one in compiled.items()}
+        for name in ("inverse_dynamics", "direct_dynamics")
+    )
     states = {} if model is None else _compute_states(model, motion)
     data = ReportData(
         **vars(artifacts),
@@ -103,7 +114,7 @@ def report(
         unsafe=bool(find_unsafe_models(validation.full, judged)[judged.find_row(selected.n)]),
         speed=measure_speeds(running, states) if running else None,
         speed_direct=measure_speeds(direct, states) if direct else None,
-        loops=_evaluate_loops(model, running, motion),
+        loops=_evaluate_loops(model, compiled, motion),
         tracking=_simulate_tracking(section, model, running, motion),
     )
     lean = {
@@ -138,7 +149,7 @@ def report(
         images,
         made,
         provenance,
-        _export_code(model, reduction, validation, provenance),
+        {} if exported is None else languages["c"](exported),
     ).encode()
     report_progress(len(drawn) + 1)
     return Report(summary, files)
@@ -154,14 +165,15 @@ def _list_shown(offered: Registry, model: Model | None) -> list[tuple[str, Any]]
 
 
 def _compile_models(
-    model: Model | None, selected: Selected, what: Exported
-) -> dict[str, RunningModel]:
-    """Return the exported code of the full and of the selected model, compiled; nothing if a formulation fails."""
-    if model is None:
+    model: Model | None, selected: Selected, exported: ExportedModel | None
+) -> dict[str, CompiledModel]:
+    """Return the code of the full and of the selected model, compiled; nothing if a formulation fails."""
+    if model is None or exported is None:
         return {}
-    models = {"full model": make_full_model(model), f"{selected.n} parameters": selected.model}
     try:
-        return {title: RunningModel(model, chosen, what) for title, chosen in models.items()}
+        full = compile_model(model, make_full_model(model))
+        reduced = CompiledModel(model.mechanism, exported)
+        return {"full model": full, f"{selected.n} parameters": reduced}
     except FormulationError as error:
         warnings.warn(f"nothing is timed: {error}", ParamreduceWarning, stacklevel=2)
         return {}
@@ -181,12 +193,12 @@ def _compute_states(model: Model, motion: ShownMotion) -> dict[str, FloatArray]:
 
 
 def _evaluate_loops(
-    model: Model | None, running: Mapping[str, RunningModel], motion: ShownMotion
+    model: Model | None, compiled: Mapping[str, CompiledModel], motion: ShownMotion
 ) -> LoopEvaluation | None:
     """Return the operations and the time of the kinematics of loops, or None without loops."""
-    if model is None or model.mechanism.loops is None or not running:
+    if model is None or model.mechanism.loops is None or not compiled:
         return None
-    return evaluate_loops(model, running, motion.q, motion.dz, motion.ddz)
+    return evaluate_loops(compiled, motion.q, motion.dz, motion.ddz)
 
 
 def _simulate_tracking(
@@ -201,25 +213,23 @@ def _simulate_tracking(
     return simulate_tracking(section.tracking, model, running, motion.z, motion.dz)
 
 
-def _export_code(
+def _export_selected(
     model: Model | None, reduction: Reduction, validation: Validation, provenance: Provenance
-) -> Mapping[str, bytes]:
-    """Return the checked C code of the selected model; nothing without a mechanism."""
+) -> ExportedModel | None:
+    """Return the selected model, checked and ready to be written as code; None without a mechanism."""
     if model is None:
-        return {}
+        return None
     chosen, title = find_chosen_model(None, model, reduction, validation)
     origin = f"report of config {provenance.config_sha256[:12]}"
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", ParamreduceWarning)  # the header says it too
-            exported = make_exported_model(
+            return make_exported_model(
                 model, chosen, title=title, validation=validation, origin=origin
             )
     except FormulationError as error:
         warnings.warn(f"the page has no code: {error}", ParamreduceWarning, stacklevel=2)
-        return {}
-    files: Mapping[str, bytes] = languages["c"](exported)
-    return files
+        return None
 
 
 def _compute_torque_rms(samples: Samples, nominal: FloatArray) -> dict[str, FloatArray]:

@@ -29,7 +29,6 @@ from paramreduce_cli.excitation.simulation import (
     simulate,
 )
 from paramreduce_cli.excitation.symmetry import complete_series, generate_group
-from paramreduce_cli.export.running import CompiledForwardDynamics
 from paramreduce_cli.fields.section import expand_per_joint
 from paramreduce_cli.identification.measured_samples import LoggedSet
 from paramreduce_cli.multibody.dynamics import Dynamics
@@ -49,6 +48,7 @@ from paramreduce_cli.records import (
     SETS,
     Block,
     FloatArray,
+    Formulations,
     IntArray,
     Items,
     MeasuredLog,
@@ -353,8 +353,16 @@ def _sample_simulation(
 
 def _choose_forward_dynamics(model: Model, dynamics: Dynamics) -> MassAndBias:
     """Return the mass matrix and bias of the full model: compiled code, or the regressor without a compiler."""
-    compiled = CompiledForwardDynamics(model, make_full_model(model))
-    return compiled if compiled.is_compiled else TextbookMassAndBias(dynamics, model.values)
+    # Late, as few configs simulate: exports load templates, and more.
+    from paramreduce_cli.export.code_generation import Exported
+    from paramreduce_cli.export.running import CompiledForwardDynamics, compile_model
+
+    known = model.formulations
+    plain = replace(model, formulations=Formulations(known.inverse[:1], known.direct[:1]))
+    compiled = compile_model(plain, make_full_model(model), Exported.DDM)
+    if compiled.library is None:
+        return TextbookMassAndBias(dynamics, model.values)
+    return CompiledForwardDynamics(compiled)
 
 
 def _read_motion_states(motions: list[SimulatedMotion]) -> StatesAt:

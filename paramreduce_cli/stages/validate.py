@@ -74,9 +74,11 @@ _MEASURED_ON = frozenset(
     {"model.h5", "samples.h5", "reduction.h5", "reduction", "validation.operations"}
 )
 """What measurements and stability depend on."""
-_MOST_ACCELERATIONS = 20_000
-"""Samples of a set, evenly spread, on which models predict accelerations: each takes a mass matrix of
-every model, and more of them tell no more."""
+_MOST_ACCELERATIONS, _FEWEST_ACCELERATIONS = 20_000, 300
+"""Most samples of a set, evenly spread, on which models predict accelerations: each takes a mass matrix of
+every model, and more of them tell no more. Fewest samples where models are many and large."""
+_MOST_PRODUCTS = 6e10
+"""Products that the mass matrices of all models on the samples of a set may take: about ten seconds."""
 _THINNED = (2, 4, 8)
 """Every so many samples are kept to see what their number does."""
 _FOLD_NODES = 5_000
@@ -216,6 +218,8 @@ def _measure(
         raise DataError("samples.h5 holds no /nominal_acceleration; it is needed to validate.")
     models = _Models(reduction, model.values)
     _check_coordinates(model, samples)
+    each = (nominal.size + 2) * nominal.size * models.values.size
+    most = int(np.clip(_MOST_PRODUCTS / each, _FEWEST_ACCELERATIONS, _MOST_ACCELERATIONS))
 
     def measure(sample_set: SampleSet, name: str, *, by_motion: bool = False) -> list[_Errors]:
         """Errors on a set as a whole, or on each of its motions."""
@@ -232,7 +236,7 @@ def _measure(
                 return iter([blocks])
             return (own for _, own in groupby(blocks, lambda block: block.trajectory))
 
-        spread = decimate_blocks(report_heuristic("accelerations"), -(-n // _MOST_ACCELERATIONS))
+        spread = decimate_blocks(report_heuristic("accelerations"), -(-n // most))
         torques = [
             compute_torque_errors(part, models.values, reduction.nominal_torque)
             for part in parts(report_heuristic("torques"))

@@ -6,7 +6,7 @@ from conftest import TWO_LINK, config_and_model
 from oracles.lagrange import Lagrange, forward_dynamics
 from scipy.integrate import simpson
 
-from paramreduce_cli.excitation.signals import Harmonics, Joined
+from paramreduce_cli.excitation.input_signals import Harmonics, Joined
 from paramreduce_cli.excitation.simulation import Inputs, TextbookMassAndBias, simulate
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.multibody.loops.coordinates import Coordinates

@@ -5,8 +5,7 @@ import pytest
 from conftest import config_and_model
 
 from paramreduce_cli.export import running
-from paramreduce_cli.export.code_generation import Exported
-from paramreduce_cli.export.running import RunningModel, measure_speeds
+from paramreduce_cli.export.running import RunningModel, compile_model, measure_speeds
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.multibody.loops.coordinates import Coordinates
 from paramreduce_cli.multibody.random_states import draw_states
@@ -25,7 +24,7 @@ def test_torques_are_those_of_plain_recursion(robot, compiled, monkeypatch):
     if mechanism.loops is not None:
         R = Coordinates(mechanism).compute_tangent(states[0])[:, list(mechanism.dependent)]
         states = (*states, R)
-    found = RunningModel(model, chosen)
+    found = RunningModel(compile_model(model, chosen), "inverse_dynamics")
     assert found.language == ("C" if compiled else "Python")
     assert found(*states) == pytest.approx(wanted, rel=1e-9, abs=1e-9)
     assert found(*states, repetitions=3) == pytest.approx(wanted, rel=1e-9, abs=1e-9)
@@ -50,7 +49,7 @@ def test_mass_matrix_and_remainder_give_the_same_torques(robot, compiled, monkey
         coordinates, dependent = Coordinates(mechanism), list(mechanism.dependent)
         still = coordinates.compute_rates(q, dq[:, z], np.zeros((20, len(z))))[1]
         states |= {"R": coordinates.compute_tangent(q)[:, dependent], "b": still[:, dependent]}
-    found = RunningModel(model, chosen, Exported.DDM)
+    found = RunningModel(compile_model(model, chosen), "direct_dynamics")
     given = found(*(states[name] for name in found.takes))
     n = len(z)
     M, delta = given[:, : n * n].reshape(-1, n, n), given[:, n * n :]

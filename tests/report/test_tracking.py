@@ -114,7 +114,7 @@ def test_a_model_in_doubt_is_not_timed(invoke, two_link_copy, monkeypatch):
     def failing(*_):
         raise FormulationError("two formulations disagree")
 
-    monkeypatch.setattr(report, "RunningModel", failing)
+    monkeypatch.setattr(report, "compile_model", failing)
     made = invoke(
         "report", TWO_LINK, "--results", two_link_copy, "--force", settings=["report.formats=[svg]"]
     )

@@ -35,6 +35,13 @@ def c(model: ExportedModel) -> dict[str, bytes]:
     return result
 
 
+def write_scalar_source(model: ExportedModel) -> tuple[str, str]:
+    """Return the prefix of the names of functions, and C source without the batched ones, which take long to compile."""
+    context = _Writer(model).make_context() | {"batched": False}
+    header, source = (render_template(name, **context) for name in ("model.h", "model.c"))
+    return model.name, header + source.replace(f'#include "{model.name}.h"', "")
+
+
 def name_cpp_type(array: Argument) -> str:
     """Return the C++ type of an array."""
     kind = "Vector" if len(array.shape) == 1 else "Matrix"
@@ -73,6 +80,7 @@ class _Writer:
             "f": self._suffix,
             "bits": 32 if model.single else 64,
             "block": BLOCK,
+            "batched": True,
             **model.list_coordinates(),
             "n_phi": 0 if model.constant else len(model.parameters),
             "loops": bool(model.closures),
