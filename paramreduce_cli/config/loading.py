@@ -76,7 +76,7 @@ def load_config(path: Path, overrides: Sequence[str] = ()) -> Config:
         )  # fmt: skip
     for text in find_warnings(config):
         warnings.warn(text, ParamreduceWarning, stacklevel=2)
-    return _resolve_paths(_drop_unused_tests(config), path.parent)
+    return _resolve_paths(_drop_unused_tests(_choose_use(config)), path.parent)
 
 
 def load_settings(path: Path | None, overrides: Sequence[str] = ()) -> Settings:
@@ -401,6 +401,14 @@ def _format_problem(document: Document, problem: Problem) -> str:
     end = "" if message.rstrip().endswith((".", "?")) else "."
     key = document.find_original(path)
     return f"{document.describe_place(path)}: {prepend_key(key, message)}{end}"
+
+
+def _choose_use(config: Config) -> Config:
+    """Return the config with the purpose of the selected model, simulation if samples are simulated."""
+    if config.selected.use is not None:
+        return config
+    use = "feed-forward" if config.sampling.simulation is None else "simulation"
+    return config.model_copy(update={"selected": config.selected.model_copy(update={"use": use})})
 
 
 def _drop_unused_tests(config: Config) -> Config:

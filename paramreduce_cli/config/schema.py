@@ -385,6 +385,11 @@ class SelectedSection(Section):
 
     USUAL: ClassVar[Mapping[str, float]] = {"torque_error": 0.01}
     """Tolerances where none are given."""
+    SIMULATED: ClassVar[Mapping[str, float]] = {"acceleration_error": 0.05}
+    """Tolerances that models for simulation have besides."""
+
+    use: Literal["feed-forward", "simulation"] | None = None
+    """Purpose of the model. For simulation its mass matrix is positive definite on all samples, and it keeps acceleration_error, 0.05 if that is not given; if left out simulation where samples come from one, otherwise feed-forward."""
 
     heuristic: Method | None = None
     """Whose subset; of all heuristics the best one if left out."""
@@ -412,6 +417,11 @@ class SelectedSection(Section):
         """Return the given tolerances by key."""
         keys = ("torque_error", "acceleration_error", "operations")
         return {key: value for key in keys if (value := getattr(self, key)) is not None}
+
+    def list_tolerances(self) -> dict[str, float]:
+        """Return the tolerances that hold, given or not, by key."""
+        given = self.get_tolerances() or dict(self.USUAL)
+        return {**self.SIMULATED, **given} if self.use == "simulation" else given
 
 
 class Acceptance(Section):

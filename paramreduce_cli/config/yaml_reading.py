@@ -35,6 +35,8 @@ class Document:
     """Keys whose values are None for one of these problems."""
     overrides: dict[Key, str] = field(default_factory=dict)
     """Keys set on the command line, with the text given there."""
+    own_keys: dict[int, set[int]] = field(default_factory=dict)
+    """Identities of the keys of each mapping that are not merged into it, by the identity of its node."""
     originals: dict[Key, Key] = field(default_factory=dict)
     """Keys of parts that were copied, with the keys that they were copied from."""
 
@@ -123,7 +125,8 @@ def _build_data(loader: yaml.SafeLoader, node: yaml.Node, path: Key, document: D
     """Return the plain data of a node, and note the lines of its keys in the document."""
     document.lines.setdefault(path, node.start_mark.line + 1)
     if isinstance(node, yaml.MappingNode):
-        own = {id(key) for key, _ in node.value}
+        # An aliased mapping is read again, with the keys that were merged into it at first.
+        own = document.own_keys.setdefault(id(node), {id(key) for key, _ in node.value})
         met: set[str] = set()
         loader.flatten_mapping(node)
         result: dict[str, Any] = {}

@@ -42,10 +42,9 @@ def find_leanest(
         }
         tolerances = _list_tolerances(function, budget)
         looked_at = _BOTH[:1] if terms.held_out else _BOTH
+    usual = _list_tolerances(function, {**SelectedSection.USUAL, **section.list_tolerances()})
     limits = {
-        (key, part): limit
-        for key, limit in (tolerances or SelectedSection.USUAL).items()
-        for part in looked_at
+        (key, part): limit for key, limit in (tolerances or usual).items() for part in looked_at
     }
     found = [
         *_iterate_models(function, limits, results),

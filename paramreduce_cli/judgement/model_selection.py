@@ -5,6 +5,7 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 
 from paramreduce_cli.records import (
+    BoolArray,
     FloatArray,
     HeuristicValidation,
     IntArray,
@@ -44,17 +45,25 @@ def compute_worst_ratios(
 
 
 def find_smallest_within(
-    results: Mapping[str, HeuristicValidation], tolerances: Mapping[str, float]
+    results: Mapping[str, HeuristicValidation],
+    tolerances: Mapping[str, float],
+    excluded: Mapping[str, BoolArray],
 ) -> Pick | None:
     """Return the model with the fewest parameters that keeps all tolerances on both sets, or None.
 
     If only operations have a tolerance, the model has the smallest error instead. Of several models of that size the
     one with the smallest torque error on the estimation set is returned; of equal ones that of the last heuristic.
+
+    Args:
+        results: Validation of each heuristic.
+        tolerances: Tolerances by key.
+        excluded: Masks of the models that must not be chosen, by heuristic; all may be chosen of heuristics without one.
     """
     good = [
         (name, int(row))
         for name, result in results.items()
         for row in np.flatnonzero(compute_worst_ratios(result, tolerances) <= 1)
+        if name not in excluded or not excluded[name][row]
     ]
     if good and set(tolerances) == {"operations"}:
         return _find_best(results, good)

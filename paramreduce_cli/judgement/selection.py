@@ -19,6 +19,7 @@ from paramreduce_cli.judgement.model_selection import (
     is_proven_smallest,
 )
 from paramreduce_cli.records import (
+    BoolArray,
     CrossValidation,
     FloatArray,
     HeuristicValidation,
@@ -29,6 +30,9 @@ from paramreduce_cli.records import (
 from paramreduce_cli.reduction.models import make_reduced_model
 from paramreduce_cli.texts import format_percent
 
+_SAFE = ", and with a mass matrix that is positive definite on all samples"
+"""Requirement for models that are to be simulated, as part of a sentence."""
+
 
 def select_model(
     section: SelectedSection,
@@ -36,6 +40,7 @@ def select_model(
     reduction: Reduction,
     results: Mapping[str, HeuristicValidation],
     cross_validation: Mapping[str, CrossValidation] | None,
+    unsafe: Mapping[str, BoolArray],
 ) -> Selected:
     """Return the model of the size that the config asks for, or the smallest model within the tolerances on both sets.
 
@@ -48,6 +53,7 @@ def select_model(
         reduction: The subsets.
         results: Errors and costs of the reduced models.
         cross_validation: Errors on folds, if the size is chosen by cross-validation.
+        unsafe: Masks of the models that must not be simulated, by heuristic.
 
     Raises:
         ConfigError: There is no model of that size.
@@ -67,13 +73,14 @@ def select_model(
         heuristic, row = _find_of_size(section.n, results)
         reason = f"{heuristic} with the {section.n} parameters that selected.n asks for."
     else:
-        tolerances = section.get_tolerances() or SelectedSection.USUAL
-        choice = find_smallest_within(results, tolerances)
+        tolerances = section.list_tolerances()
+        simulated = section.use == "simulation"
+        choice = find_smallest_within(results, tolerances, unsafe if simulated else {})
         heuristic, row = choice if choice is not None else find_nearest_to(results, tolerances)
         n = int(results[heuristic].n[row])
         if choice is None:
             worst = float(compute_worst_ratios(results[heuristic], tolerances)[row])
-            missed = f"no model has {_format_tolerances(tolerances)}, the nearest is {worst:.3g} times beyond"
+            missed = f"no model has {_format_tolerances(tolerances)}{_SAFE if simulated else ''}, the nearest is {worst:.3g} times beyond"
             reason = f"{heuristic} with n = {n}: {missed}."
         else:
             reason = _explain_choice(section, tolerances, reduction, heuristic, n)
@@ -151,7 +158,8 @@ def _explain_choice(
     if set(tolerances) == {"operations"}:
         return f"{who} has the smallest torque error with {_format_tolerances(tolerances)}."
     whose = f" of {section.heuristic}" if section.heuristic is not None else ""
-    text = f"{who} is the smallest model found{whose} with {_format_tolerances(tolerances)}"
+    safe = _SAFE if section.use == "simulation" else ""
+    text = f"{who} is the smallest model found{whose} with {_format_tolerances(tolerances)}{safe}"
     limit = tolerances.get("torque_error")
     if reduction.proofs is None or limit is None or n == 1:
         return f"{text}."
@@ -162,10 +170,12 @@ def _explain_choice(
 
 def _format_tolerances(tolerances: Mapping[str, float]) -> str:
     """Return the tolerances as text."""
-    shown = [
-        f"{key.replace('_', ' ')} at most {format_percent(value)} on the estimation and the validation set"
-        if "error" in key
-        else f"at most {value:g} operations of d"
-        for key, value in tolerances.items()
+    errors = [
+        f"{key.replace('_', ' ')} at most {format_percent(tolerances[key])}"
+        for key in ("torque_error", "acceleration_error")
+        if key in tolerances
     ]
+    shown = [f"{' and '.join(errors)} on the estimation and the validation set"] if errors else []
+    if "operations" in tolerances:
+        shown.append(f"at most {tolerances['operations']:g} operations of d")
     return " and ".join(shown)

@@ -104,12 +104,13 @@ class Dynamics:
             another axis at the end.
         """
         # At rest, so that what the velocities need does not cancel: near singular configurations
-        # of loops it is large.
+        # of loops it is large. Regressors are subtracted, so that stiff springs cancel exactly.
         rest = np.zeros_like(q)
         tangent, drift = self._compute_tangent_and_drift(q, dq)
-        weight = self.compute_torques(q, rest, rest, phi)
+        still = self.compute_regressor(q, rest, rest)
         columns = [
-            self.compute_torques(q, rest, unit, phi) - weight for unit in tangent.transpose(2, 0, 1)
+            (self.compute_regressor(q, rest, unit) - still) @ phi
+            for unit in tangent.transpose(2, 0, 1)
         ]
         return np.stack(columns, axis=2), self.compute_torques(q, dq, drift, phi)
 

@@ -26,7 +26,7 @@ from paramreduce_cli.judgement.torque_errors import (
     compute_joint_errors,
     compute_torque_errors,
 )
-from paramreduce_cli.judgement.verdict import find_model_warnings, judge_model
+from paramreduce_cli.judgement.verdict import find_model_warnings, find_unsafe_models, judge_model
 from paramreduce_cli.lean.counting import COUNTS, TEXTBOOK_COUNTS, Counts
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.multibody.observation import (
@@ -130,7 +130,8 @@ def validate(
         if crossed is None or set(crossed) != set(methods):
             crossed = _cross_validate(search, methods, model, samples, reduction, run)
     values = samples.values if model is None else model.values
-    selected = select_model(section, values, reduction, heuristics, crossed)
+    unsafe = {name: find_unsafe_models(full, result) for name, result in heuristics.items()}
+    selected = select_model(section, values, reduction, heuristics, crossed, unsafe)
     if model is not None and costs is not None:
         full |= _count_operations(Counts(model, counted), "selected_", selected.model)
         estimated = find_pareto_front(costs.estimate(heuristics))
