@@ -53,7 +53,8 @@ def expand_subsystems(document: Document) -> list[Problem]:
             problems.append(((*place, "subsystem"), error))
         elif isinstance(subsystems[name], dict):
             copied = _Copy(subsystems[name], str(use.get("suffix", "")), use.get("mirror"))
-            problems += _merge(document, ("subsystems", name), copied.write(), place)
+            # Where one name clashes, so do all.
+            problems += _merge(document, ("subsystems", name), copied.write(), place)[:1]
     return problems
 
 

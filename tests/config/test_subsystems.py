@@ -1,0 +1,148 @@
+"""Subsystems that are used mirrored, and named points."""
+
+import numpy as np
+import pytest
+
+from paramreduce_cli.config.loading import load_config
+from paramreduce_cli.errors import ConfigError
+from paramreduce_cli.multibody.dynamics import Dynamics
+from paramreduce_cli.multibody.kinematics import compute_body_poses
+from paramreduce_cli.multibody.loops.assembly import assemble
+
+MIRRORED = """
+robot: pair
+constants: {{w: 0.4}}
+subsystems:
+  arm:
+    points: {{foot: [0.1, w, 0.2, ], knee: [0.3, w + 0.5, 0.1], eye: [0.2, 0.7, 0.4]}}
+    bodies:
+      - {{name: thigh, parent: trunk, at: foot, axes: to knee}}
+      - {{name: rod, parent: thigh, joint: prismatic, axes: [0.2, 0.5, -0.1], at: [{{xyz: [0.1, 0.2, 0.05]}}, {{rx: 0.3}}, {{ry: 0.2}}]}}
+      - {{name: hand, parent: rod, axes: -{axis}, at: [0.05, "w/4", 0.02], coordinates: wrist}}
+      - {{name: eyed, parent: trunk, joint: prismatic, axes: to knee, at: eye}}
+    parameters:
+      thigh: {{m: 3, com: knee, inertia_com: [0.2, 0.01, 0.02, 0.3, 0.03, 0.4]}}
+      rod: {{m: 1, mx: 0.1, my: 0.2, mz: -0.1, Ixx: 0.3, Iyy: 0.4, Izz: 0.5, Ixy: 0.03, Ixz: -0.02, Iyz: 0.05}}
+      hand: {{m: 0.5, com: [0.1, 0.03, 0.02], inertia_com: [[0.1, 0.01, 0], [0.01, 0.2, 0.02], [0, 0.02, 0.15]]}}
+      eyed: {{m: 0.2}}
+    drives:
+      wrist: {{viscous: 0.3}}
+      both: {{motion: {{q_thigh: 1, wrist: -2}}, stiffness: 4, rest: 0.1}}
+    forces:
+      spring: {{type: line, bodies: [trunk, hand], at: [eye, [0.1, 0.2, 0.3]], stiffness: 300, rest: 0.2, viscous: 20}}
+uses:
+  - {{subsystem: arm, suffix: _l}}
+  - {{subsystem: arm, suffix: _r, mirror: y}}
+description:
+  tree: {{bodies: [{{name: trunk, joint: prismatic, axes: z, coordinates: height}}]}}
+parameter_sets: {{p: {{trunk: {{m: 10}}}}}}
+nominal_torque: 10
+trajectories: {{position_limits: [-1, 1], velocity_limits: 1}}
+"""
+
+
+def load(tmp_path, text, **values):
+    path = tmp_path / "config.yaml"
+    path.write_text(text.format(**values))
+    return load_config(path)
+
+
+@pytest.mark.parametrize("axis", "xyz")
+def test_a_mirrored_side_has_the_same_torques_at_the_same_coordinates(tmp_path, axis):
+    config = load(tmp_path, MIRRORED, axis=axis)
+    mechanism, values = config.build_mechanism(), config.get_values()
+    rng = np.random.default_rng(1)
+    n = (mechanism.n_q - 1) // 2
+    left = rng.normal(size=(3, 20, n))
+    trunk = rng.normal(size=(3, 20, 1))
+    states = np.concatenate([trunk, left, left], axis=2)
+    tau = Dynamics(mechanism).compute_torques(*states, values)
+    assert mechanism.generalised_names[1 : 1 + n] == (
+        "q_thigh_l", "q_rod_l", "wrist_l", "q_eyed_l",
+    )  # fmt: skip
+    np.testing.assert_allclose(tau[:, 1 : 1 + n], tau[:, 1 + n :], rtol=1e-11, atol=1e-11)
+    assert np.abs(tau[:, 1:]).max() > 1
+    poses = compute_body_poses(mechanism, states[0, 0])
+    flip = np.diag([1.0, -1.0, 1.0])
+    for k in range(1, 1 + n):
+        np.testing.assert_allclose(poses[k + n, :3, 3], flip @ poses[k, :3, 3], atol=1e-12)
+        np.testing.assert_allclose(poses[k + n, :3, :3], flip @ poses[k, :3, :3] @ flip, atol=1e-12)
+
+
+def test_points_are_in_the_base_frame_while_all_coordinates_are_zero(tmp_path):
+    config = load(tmp_path, MIRRORED, axis="x")
+    mechanism = config.build_mechanism()
+    poses = compute_body_poses(mechanism, np.zeros(mechanism.n_q))
+    names = [body.name for body in mechanism.bodies]
+    np.testing.assert_allclose(poses[names.index("thigh_l"), :3, 3], [0.1, 0.4, 0.2])
+    thigh = mechanism.bodies[names.index("thigh_l")].parent_to_joint[:3, 2]
+    np.testing.assert_allclose(thigh, np.array([0.2, 0.5, -0.1]) / np.sqrt(0.3))
+    values = dict(zip(mechanism.parameter_names, config.get_values(), strict=True))
+    assert values["mx_thigh_l"] == pytest.approx(3 * 0.2)
+    assert values["my_thigh_l"] == pytest.approx(-values["my_thigh_r"])
+
+
+LOOP = """
+robot: loop
+description:
+  tree:
+    points: {{A: [0, 0, 0], B: [0, 0, 0.5], C: [1, 0, 0.7], D: [1.2, 0, 0]}}
+    bodies:
+      - {{name: crank, at: A, axes: y}}
+      - {{name: rod, parent: crank, at: B, axes: y}}
+      - {{name: rocker, at: D, axes: y}}
+    closures: [{{type: {kind}, bodies: [rod, rocker], at: {at}}}]
+    independent: [{independent}]
+parameter_sets: {{p: {{crank: {{m: 1, com: B}}, rod: {{m: 1, com: C}}, rocker: {{m: 1, com: C}}}}}}
+trajectories: {{position_limits: [-1, 1], velocity_limits: 1}}
+"""
+
+
+def test_loops_are_closed_where_all_coordinates_are_zero(tmp_path):
+    config = load(tmp_path, LOOP, kind="point", at="C", independent="q_crank")
+    with pytest.warns(match="of the 3 equations"):
+        assert not assemble(config.build_mechanism()).loops.assembly.any()
+
+
+def test_a_rod_between_two_points_is_as_long_as_they_are_apart(tmp_path):
+    config = load(tmp_path, LOOP, kind="distance", at="[C, B]", independent="q_crank, q_rod")
+    (closure,) = config.build_mechanism().loops.closures
+    assert closure.length == pytest.approx(np.hypot(1, 0.2))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "line", "says"),
+    [
+        ("at: foot", "at: fot", 8, "unknown point 'fot'"),
+        ("subsystem: arm, suffix: _l", "subsystem: ram, suffix: _l", 23, "unknown subsystem 'ram'"),
+        (
+            "suffix: _r",
+            "suffix: _l",
+            24,
+            "'foot_l' of 'foot', which description.tree.points has already",
+        ),
+        ("joint: prismatic, axes: to knee", "joint: prismatic, axes: to eye", 11, "no direction"),
+        ("stiffness: 4", "stiffnes: 4", 19, "subsystems.arm.drives.both.stiffnes"),
+        ("m: 0.5, com", "m: half, com", 15, "subsystems.arm.parameters.hand.m"),
+        ("mirror: y", "mirror: w", 24, "'x', 'y' or 'z'"),
+    ],
+)
+def test_what_is_wrong_names_the_line_of_the_subsystem(tmp_path, old, new, line, says):
+    assert MIRRORED.count(old) == 1
+    with pytest.raises(ConfigError) as caught:
+        load(tmp_path, MIRRORED.replace(old, new), axis="x")
+    assert f"line {line}: " in str(caught.value)
+    assert says in str(caught.value)
+
+
+def test_a_setting_reaches_one_side_alone(tmp_path):
+    path = tmp_path / "config.yaml"
+    path.write_text(MIRRORED.format(axis="x"))
+    values = {}
+    for overrides in ([], ["parameter_sets.p.hand_r.m=0.7"]):
+        config = load_config(path, overrides)
+        names = config.build_mechanism().parameter_names
+        values[len(overrides)] = dict(zip(names, config.get_values(), strict=True))
+    changed = {name for name, value in values[0].items() if value != values[1][name]}
+    assert {"m_hand_r", "mx_hand_r"} <= changed
+    assert all(name.endswith("hand_r") for name in changed)
