@@ -1,5 +1,6 @@
 """Simulated motions against Lagrange's equations with multipliers, and by their energy."""
 
+import h5py
 import numpy as np
 import pytest
 from conftest import TWO_LINK, config_and_model
@@ -139,3 +140,108 @@ def test_bodies_without_mass_cannot_be_simulated(invoke, tmp_path):
     path = TWO_LINK.parent / "cart_pole.yaml"
     out = invoke("run", path, "--results", tmp_path, settings=settings, code=2)
     assert "the mass matrix is singular" in " ".join(out.err.split())
+
+
+SPRUNG = """
+robot: sprung
+description:
+  gravity: [0, 0, -9.81]
+  tree:
+    bodies:
+      - {name: ground, joint: prismatic, coordinates: ground, massless: true}
+      - {name: wheel, joint: prismatic, coordinates: wheel}
+      - {name: car, joint: prismatic, coordinates: car}
+      - {name: trolley, joint: prismatic, axes: x, coordinates: trolley}
+parameter_sets: {p: {wheel: {m: 40}, car: {m: 300}, trolley: {m: 2}}}
+drives:
+  strut: {motion: {car: 1, wheel: -1}, stiffness: 2e4, viscous: 1500, rest: 0.1}
+forces:
+  tyre: {type: tyre, bodies: [ground, wheel], at: [[0, 0, 0], [0, 0, 0]], radius: 0.3, stiffness: 2e5, viscous: 200}
+nominal_torque: [1000, 1000, 1000, 1]
+sampling:
+  simulation:
+    equilibrium: true
+    speed: {trolley: 2}
+    motions: {ground: {amplitude: 0.02, frequencies: [1.3]}}
+    duration: 2
+    step: 0.01
+    runs: 1
+    test_runs: 0
+"""
+
+
+def write_sprung(folder, *changes):
+    text = SPRUNG
+    for old, new in changes:
+        assert text.count(old) == 1
+        text = text.replace(old, new)
+    path = folder / "sprung.yaml"
+    path.write_text(text)
+    return path
+
+
+def test_prescribed_motions_are_followed_and_their_torques_are_what_they_take(invoke, tmp_path):
+    path = write_sprung(tmp_path)
+    invoke("build-model", path, "--results", tmp_path)
+    invoke("sample", path, "--results", tmp_path)
+    with h5py.File(tmp_path / "samples.h5") as file:
+        z, dz, ddz, tau = (file[f"estimation/{key}"][()] for key in ("z", "dz", "ddz", "tau"))
+        time, nominal = file["estimation/time"][()], file["nominal_acceleration"][()]
+    assert np.isinf(nominal[0])
+    assert np.isfinite(nominal[1:]).all()
+    fit = np.column_stack([np.sin(2 * np.pi * 1.3 * time), np.cos(2 * np.pi * 1.3 * time)])
+    (a, b), *_ = np.linalg.lstsq(fit, z[:, 0], rcond=None)
+    np.testing.assert_allclose(fit @ [a, b], z[:, 0], atol=1e-12)
+    assert np.hypot(a, b) == pytest.approx(0.02)
+    tyre = 2e5 * (z[:, 1] - z[:, 0] - 0.3) + 200 * (dz[:, 1] - dz[:, 0])
+    strut = 2e4 * (z[:, 2] - z[:, 1] - 0.1) + 1500 * (dz[:, 2] - dz[:, 1])
+    np.testing.assert_allclose(tau[:, 0], -tyre, rtol=1e-9, atol=1e-6)
+    np.testing.assert_allclose(40 * (ddz[:, 1] + 9.81), strut - tyre, rtol=1e-9, atol=1e-6)
+    np.testing.assert_allclose(300 * (ddz[:, 2] + 9.81), -strut, rtol=1e-9, atol=1e-6)
+    # Static equilibrium at the start: what tyre and strut carry, and a trolley that nothing holds.
+    ground = z[0, 0]
+    assert z[0, 1] == pytest.approx(ground + 0.3 - 340 * 9.81 / 2e5, abs=1e-9)
+    assert z[0, 2] == pytest.approx(z[0, 1] + 0.1 - 300 * 9.81 / 2e4, abs=1e-9)
+    assert z[0, 3] == pytest.approx(0, abs=1e-9)
+    np.testing.assert_allclose(dz[:, 3], 2, atol=1e-9)
+
+
+def test_a_road_from_a_file_is_met_with_delay(invoke, tmp_path):
+    distance = np.arange(0, 40, 0.1)
+    np.savetxt(
+        tmp_path / "road.csv",
+        np.column_stack([distance, 0.03 * np.sin(distance)]),
+        delimiter=",", header="distance,height", comments="",
+    )  # fmt: skip
+    road = "road: {speed: 10, tracks: [[ground, trolley]], distances: [0, 3], file: road.csv}"
+    path = write_sprung(tmp_path, ("motions: {ground: {amplitude: 0.02, frequencies: [1.3]}}", road),
+                        ("    speed: {trolley: 2}\n", ""))  # fmt: skip
+    invoke("build-model", path, "--results", tmp_path)
+    invoke("sample", path, "--results", tmp_path)
+    with h5py.File(tmp_path / "samples.h5") as file:
+        z, time = file["estimation/z"][()], file["estimation/time"][()]
+    np.testing.assert_allclose(z[:, 0], 0.03 * np.sin(10 * time + 3), atol=1e-5)
+    np.testing.assert_allclose(z[:, 3], 0.03 * np.sin(10 * time), atol=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("changes", "says"),
+    [
+        ([("drives:\n", "drives:\n  wheel: {offset: 10}\n"),
+          ("motion: {car: 1, wheel: -1}, stiffness: 2e4", "motion: {car: 1, wheel: -1}, stiffness: 0")],
+         "there is no static equilibrium"),
+        ([("{amplitude: 0.02, frequencies: [1.3]}", "{file: short.csv}")], "holds 0 to 1 s"),
+        ([("ground: {amplitude", "gruond: {amplitude")], "Did you mean ground?"),
+        ([("    step: 0.01\n", "    step: 0.01\n    inputs: {ground: {amplitude: 1, frequencies: [1]}}\n")],
+         "whose motion is prescribed"),
+        ([("motions: {ground: {amplitude: 0.02, frequencies: [1.3]}}",
+           "road: {speed: 10, tracks: [[ground, wheel]], distances: [0]}")], "each track needs 1"),
+    ],
+)  # fmt: skip
+def test_vehicles_that_cannot_be_simulated_are_refused(invoke, tmp_path, changes, says):
+    np.savetxt(tmp_path / "short.csv", np.linspace([0, 0], [1, 0.1], 20), delimiter=",",
+               header="time,height", comments="")  # fmt: skip
+    path = write_sprung(tmp_path, *changes)
+    out = invoke("run", path, "--results", tmp_path, code=2)
+    assert says in " ".join(out.err.split())
+    assert "Traceback" not in out.err
