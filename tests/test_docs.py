@@ -202,7 +202,7 @@ def without_point_names(content, key=""):
         return [[0, 0, 0], [0, 0, 1]] if content.endswith("ball") else [0, 0, 0]
     if isinstance(content, str) and key == "axes" and "to " in content:
         return "x"
-    if isinstance(content, list) and key != "bodies" or key == "closures":
+    if (isinstance(content, list) and key != "bodies") or key == "closures":
         return [without_point_names(entry, key) for entry in content]
     if isinstance(content, list):
         return [without_point_names(e) if isinstance(e, dict) else e for e in content]
