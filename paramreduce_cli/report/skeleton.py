@@ -12,6 +12,10 @@ _AXIS = 0.05
 """Half of a joint's axis as it is drawn, over the size of the motion."""
 
 
+_TRAVEL = 0.1
+"""Travel of a floating body, relative to the size of the mechanism, that is not drawn."""
+
+
 @dataclass(frozen=True)
 class Skeleton:
     """A mechanism in one pose, for drawing."""
@@ -52,6 +56,24 @@ def make_skeleton(model: Model, q: FloatArray) -> Skeleton:
     )
 
 
+def hold_travel(mechanism: Mechanism, q: FloatArray) -> FloatArray:
+    """Return positions along motions without the travel of bodies that float freely, where it is long beside the mechanism.
+
+    Args:
+        mechanism: The mechanism.
+        q: Generalised coordinates, (n_positions, n_q).
+    """
+    held = q.copy()
+    for k, body in enumerate(mechanism.bodies):
+        if (
+            body.intermediate
+            and body.joint == "prismatic"
+            and np.ptp(q[:, k]) > _TRAVEL * mechanism.size
+        ):
+            held[:, k] = q[0, k]
+    return held
+
+
 @dataclass(frozen=True)
 class Animation:
     """A mechanism along its motions, for drawing: points that move, and lines between them."""
@@ -68,7 +90,8 @@ class Animation:
 
 def make_animation(model: Model, motions: Mapping[str, FloatArray]) -> Animation:
     """Return the mechanism along motions, each of generalised coordinates (n_frames, n_q)."""
-    frames = [make_skeleton(model, row) for q in motions.values() for row in q]
+    held = hold_travel(model.mechanism, np.vstack(list(motions.values())))
+    frames = [make_skeleton(model, row) for row in held]
     positions = np.array([one.poses[:, :3, 3] for one in frames])
     half = _AXIS * float(np.ptp(positions.reshape(-1, 3), axis=0).max()) or _AXIS
     points = [

@@ -55,7 +55,13 @@ from paramreduce_cli.report.data import (
 )
 from paramreduce_cli.report.figures import figures
 from paramreduce_cli.report.page_sections import get_place
-from paramreduce_cli.report.skeleton import Animation, Skeleton, make_animation, make_skeleton
+from paramreduce_cli.report.skeleton import (
+    Animation,
+    Skeleton,
+    hold_travel,
+    make_animation,
+    make_skeleton,
+)
 from paramreduce_cli.report.summary import gather_summary
 from paramreduce_cli.report.tables import tables
 from paramreduce_cli.report.tracking.demonstration import simulate_tracking
@@ -261,7 +267,8 @@ def _make_animation(model: Model, samples: Samples) -> Animation:
 def _draw_skeletons(
     section: ReportSection, model: Model, motion: ShownMotion
 ) -> tuple[Skeleton, ...]:
-    return tuple(make_skeleton(model, q) for q in _choose_poses(section, model, motion))
+    poses = np.array(_choose_poses(section, model, motion))
+    return tuple(make_skeleton(model, q) for q in hold_travel(model.mechanism, poses))
 
 
 def _choose_poses(section: ReportSection, model: Model, motion: ShownMotion) -> list[FloatArray]:

@@ -490,12 +490,15 @@ def _compute_nominal_acceleration(
 ) -> FloatArray:
     """Return the nominal accelerations of the config, or the standard deviations over the estimation set."""
     given = sampling.nominal_acceleration
+    names = model.mechanism.coordinate_names
+    simulation = sampling.simulation
+    prescribed = [] if simulation is None else [names.index(n) for n in simulation.prescribed]
     if given != "standard-deviation":
-        return expand_per_joint(given, model.mechanism.n_dof)
+        sizes = expand_per_joint(given, model.mechanism.n_dof)
+        sizes[prescribed] = np.inf
+        return sizes
     deviation = compute_standard_deviation(block.ddz for block in estimation.iterate_states())
-    if sampling.simulation is not None:
-        names = model.mechanism.coordinate_names
-        deviation[[names.index(name) for name in sampling.simulation.prescribed]] = np.inf
+    deviation[prescribed] = np.inf
     if deviation.any():
         # Of a joint that never moves in a recording there is no scale, and no error to divide by it.
         deviation[deviation == 0] = 1.0

@@ -9,6 +9,9 @@ from paramreduce_cli.report.data import ReportData, Skeleton
 from paramreduce_cli.report.page_sections import PageSection, placed
 from paramreduce_cli.report.style import break_lines, make_figure
 
+_MOST_NUMBERS = 8
+"""Coordinates of a pose that are written above it."""
+
 
 @placed(PageSection.PAPER, 9, of_mechanism=True)
 def poses(data: ReportData) -> Figure:
@@ -78,7 +81,8 @@ def _draw_skeleton(axes: Axes, skeleton: Skeleton, half: float, plots: int) -> N
     for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
         axis.set_ticklabels([])
         axis.set_pane_color((0.97, 0.975, 0.98, 1.0))
-    shown = ", ".join(f"{value:.2f}" for value in skeleton.z)
+    shown = ", ".join(f"{value:.2f}" for value in skeleton.z[:_MOST_NUMBERS])
+    shown += ", …" if len(skeleton.z) > _MOST_NUMBERS else ""
     axes.text2D(
         0.5, 0.98, break_lines(f"z = ({shown})", plots), transform=axes.transAxes, ha="center",
         fontsize="xx-small", color="#57606a",
