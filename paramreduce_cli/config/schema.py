@@ -388,9 +388,6 @@ class SelectedSection(Section):
     SIMULATED: ClassVar[Mapping[str, float]] = {"acceleration_error": 0.05}
     """Tolerances that models for simulation have besides."""
 
-    use: Literal["feed-forward", "simulation"] | None = None
-    """Purpose of the model. For simulation its mass matrix is positive definite on all samples, and it keeps acceleration_error, 0.05 if that is not given; if left out simulation where samples come from one, otherwise feed-forward."""
-
     heuristic: Method | None = None
     """Whose subset; of all heuristics the best one if left out."""
     n: Count | None = None
@@ -403,6 +400,8 @@ class SelectedSection(Section):
     """Most operations of the inverse dynamics."""
     cross_validation: bool | Literal["parsimonious"] = False
     """Whether the size is chosen by leaving out one part of the estimation set at a time; the validation set is not looked at. `true` selects the smallest model that is at most 3 % worse than the best one and than all parameters, at the upper end of a 90 % interval; `parsimonious` the smallest one within one standard error of the best."""
+    use: Literal["feed-forward", "simulation"] | None = None
+    """Purpose of the model. For simulation its mass matrix is positive definite on all samples, and it keeps acceleration_error, 0.05 if that is not given; if left out simulation where samples come from one, otherwise feed-forward."""
 
     @model_validator(mode="after")
     def _check_one_rule(self) -> SelectedSection:

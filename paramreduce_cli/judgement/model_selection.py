@@ -1,6 +1,7 @@
 """Choice of a model from many: the smallest, the best, the Pareto front."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from types import MappingProxyType
 
 import numpy as np
 
@@ -21,6 +22,7 @@ Pick = tuple[str, int]
 
 _MANY, _SOME, _NEAR = 70, 16, 2
 """Models of a curve from which on only some are shown, how many, and the sizes around the selected one that always are."""
+_NONE: Mapping[str, BoolArray] = MappingProxyType({})
 _BOTH_SETS = ("estimation", "validation")
 _PARTS = {"torque_error": _BOTH_SETS, "acceleration_error": _BOTH_SETS, "operations": ("inverse",)}
 """What tolerances are on: sets of samples, or functions."""
@@ -47,7 +49,7 @@ def compute_worst_ratios(
 def find_smallest_within(
     results: Mapping[str, HeuristicValidation],
     tolerances: Mapping[str, float],
-    excluded: Mapping[str, BoolArray],
+    excluded: Mapping[str, BoolArray] = _NONE,
 ) -> Pick | None:
     """Return the model with the fewest parameters that keeps all tolerances on both sets, or None.
 

@@ -109,7 +109,7 @@ MOVES = [
     (["identify", "configs/two_link.yaml"], "`paramreduce init ROBOT.urdf --log FILE`"),
     (["identify", "configs/two_link.yaml", "--results", "done"], "`paramreduce init ROBOT.urdf --log FILE`"),
     (["puma560"], "Next: paramreduce init --example puma560"),
-    (["init", "--example", "mine"], "there is cart_pole"),
+    (["init", "--example", "mine"], "there is bogie"),
     (["reduce", "--samples", "samples.h5"], "Next: paramreduce reduce --samples samples.h5 --results results/my_samples"),
     (["reduce", "--samples", "sample.h5", "--results", "r"],
      "Next: paramreduce reduce --samples samples.h5 --results r"),
