@@ -13,6 +13,7 @@ from paramreduce_cli.export.code_verification import (
     check_against_mechanism,
     check_closures,
     check_loop_problems,
+    find_massive_coordinates,
     find_unsafe_mass_matrices,
     make_random_cases,
     measure_single_precision,
@@ -117,7 +118,8 @@ def make_exported_model(
     unsafe = ""
     # Without some terms M was positive definite wherever it was looked at where that holds; these states may be beyond.
     if simplified is None and what in (Exported.DDM, Exported.BOTH):
-        unsafe = find_unsafe_mass_matrices(checked["M"])
+        massive = find_massive_coordinates(model, checked)
+        unsafe = find_unsafe_mass_matrices(checked["M"][:, massive][:, :, massive])
     if unsafe:
         warnings.warn(f"{title}: {unsafe}", ParamreduceWarning, stacklevel=2)
     worth = _describe_accuracy(model, unsafe, simplified, validation)

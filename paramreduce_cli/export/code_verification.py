@@ -12,8 +12,10 @@ from paramreduce_cli.lean.lean_verification import TOLERANCE, reject_if_wrong
 from paramreduce_cli.multibody.dynamics import SINGULAR_MASS, Dynamics
 from paramreduce_cli.multibody.loops.coordinates import Coordinates
 from paramreduce_cli.multibody.random_states import draw_states
-from paramreduce_cli.records import FloatArray, Mechanism, Model, ReducedModel, TermModel
+from paramreduce_cli.records import FloatArray, IntArray, Mechanism, Model, ReducedModel, TermModel
 
+_FEW = 3
+"""States that tell which coordinates move a mass."""
 _GUESS = 0.01
 """How far off the guesses of the position problem are in the self-test, rad or m."""
 
@@ -241,6 +243,18 @@ def _evaluate_function(
         columns = [np.broadcast_to(value, count) for value in own]
         result[array.name] = np.column_stack(columns).reshape(count, *array.shape)
     return result
+
+
+def find_massive_coordinates(model: Model, stored: Mapping[str, FloatArray]) -> IntArray:
+    """Return the indices of the independent coordinates that move a mass in the full model; those of a road do not.
+
+    Args:
+        model: The robot.
+        stored: States, (n_states, ...) by name.
+    """
+    q, dq = stored["q"][:_FEW], stored["dq"][:_FEW]
+    M, _ = Dynamics(model.mechanism, once=True).compute_mass_matrix_and_bias(q, dq, model.values)
+    return np.flatnonzero(np.diagonal(M, axis1=1, axis2=2).any(axis=0))
 
 
 def find_unsafe_mass_matrices(M: FloatArray) -> str:
