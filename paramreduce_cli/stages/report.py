@@ -267,6 +267,7 @@ def _make_animation(model: Model, samples: Samples) -> Animation:
 def _draw_skeletons(
     section: ReportSection, model: Model, motion: ShownMotion
 ) -> tuple[Skeleton, ...]:
+    """Return the mechanism in the poses that are drawn."""
     poses = np.array(_choose_poses(section, model, motion))
     return tuple(make_skeleton(model, q) for q in hold_travel(model.mechanism, poses))
 
