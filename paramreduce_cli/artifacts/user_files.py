@@ -140,6 +140,11 @@ def load_signals(path: Path) -> SignalTable:
             f"{path}: a signal needs a column of times or distances, columns of values, and at least "
             f"{_FEWEST_SAMPLES} rows; there are {numbers.shape[1]} columns and {numbers.shape[0]} rows."
         )
+    bad = np.flatnonzero(~np.isfinite(numbers).all(axis=1))
+    if bad.size:
+        raise DataError(
+            f"{path}: data row {bad[0] + 1} has a number that is not finite. Remove such rows."
+        )
     steps = np.diff(numbers[:, 0])
     if not np.all(steps > 0):
         row = int(np.argmin(steps)) + 2

@@ -86,8 +86,14 @@ def _check_payloads_and_drives(config: Config) -> Iterator[Problem]:
                 ("forces", name),
                 f"{name!r} is taken by a body, payload or drive; use another name",
             )
-        for key, message in section.find_problems(["base", *bodies.list_body_names()], coordinates):
+        problems = list(section.find_problems(["base", *bodies.list_body_names()], coordinates))
+        for key, message in problems:
             yield ("forces", name, *key), message
+        parts = [] if problems else section.build_forces(name, config.make_names())
+        for part in (force.drive.name for force in parts):
+            if part != name and part in {*owners, *config.forces}:
+                yield ("forces", name), f"makes {part!r}, a name that is taken; use another name"
+            owners.append(part)
     for name, drive in config.drives.items():
         if drive.friction == "auto" and config.sampling.log is None:
             yield (
@@ -224,9 +230,13 @@ def _check_simulation(config: Config) -> Iterator[Problem]:
         yield (*path, "step"), f"{section.step:g} s is too long for {section.duration:g} s"
     if section.duration / section.step > _MOST_STEPS:
         yield (*path, "step"), f"makes more than {_MOST_STEPS} samples of {section.duration:g} s"
-    for name, drive in config.list_drives().items():
-        if set(SIGN_FRICTION) & set(drive.get_values()) and not drive.smoothing:
-            yield ("drives",), f"{name} needs a smoothing: a sign that jumps cannot be simulated"
+    signs = [
+        *(("drives", n, {*d.get_values()}, d.smoothing) for n, d in config.list_drives().items()),
+        *(("forces", f.drive.name, {*f.values}, f.drive.smoothing) for f in config.list_forces()),
+    ]
+    for key, name, values, smoothing in signs:
+        if set(SIGN_FRICTION) & values and not smoothing:
+            yield (key,), f"{name} needs a smoothing: a sign that jumps cannot be simulated"
     sampling = config.sampling
     if any(sampling.list_recordings().values()) or sampling.symmetries:
         yield path, "makes all sets; leave out files and symmetries"
@@ -245,6 +255,11 @@ def _check_simulation(config: Config) -> Iterator[Problem]:
                 (*path, "inputs", name),
                 f"is a force on {name}, whose motion is prescribed; remove one of them",
             )
+        for key in ("start", "speed"):
+            if name in getattr(section, key):
+                yield (*path, key, name), f"is of {name}, whose motion is prescribed; remove it"
+    if section.prescribed and set(names) <= set(section.prescribed):
+        yield path, "prescribes the motion of all coordinates, so that nothing is simulated"
     moved = {*section.inputs, *section.prescribed, *config.unmeasured}
     still = [name for name in names if name not in moved]
     if still and config.nominal_torque == "standard-deviation":
@@ -485,3 +500,7 @@ def _warn_of_drives(config: Config) -> Iterator[str]:
         for kind, value in drive.get_values().items():
             if value < 0 and not kind.is_signed:
                 yield f"drive {name} has the negative {Parameter(kind, name).name} {value:g}"
+    for force in config.list_forces():
+        for kind, value in force.values.items():
+            if value < 0 and not kind.is_signed:
+                yield f"the negative {Parameter(kind, force.drive.name).name} {value:g}"

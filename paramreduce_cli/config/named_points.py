@@ -65,12 +65,16 @@ class _Resolver:
     def __init__(self, points: Any, constants: Mapping[str, float]) -> None:
         self._context = {"constants": dict(constants)}
         self._points: dict[str, FloatArray] = {}
+        self._unreadable: set[str] = set()
+        """Names of points that are no three numbers."""
         self._frames: dict[str, FloatArray] = {"base": np.eye(4)}
         """Frames of the bodies in the base frame while all coordinates are zero, (4, 4), m."""
         for name, value in points.items() if isinstance(points, dict) else ():
             vector = self._read_vector(value)
             if vector is not None:
                 self._points[str(name)] = vector
+            else:
+                self._unreadable.add(str(name))
 
     def resolve_tree(self, tree: dict[str, Any]) -> None:
         """Replace names in the bodies and closures of a tree."""
@@ -87,7 +91,7 @@ class _Resolver:
             names = closure.get("at")
             self._resolve_places(closure, (*_TREE, "closures", k))
             if closure.get("type") == "distance" and isinstance(names, list):
-                ends = [self._points[name] for name in names if isinstance(name, str)]
+                ends = [self._points[n] for n in names if isinstance(n, str) and n in self._points]
                 if len(ends) == 2:
                     closure.setdefault("length", float(np.linalg.norm(ends[1] - ends[0])))
 
@@ -156,6 +160,9 @@ class _Resolver:
 
     def _locate(self, name: str, frame: FloatArray, path: Key) -> list[float]:
         """Return a named point in a frame whose place in the base is given, (3,), m."""
+        if name in self._unreadable:
+            place: Key = (*_TREE, "points", name)
+            raise _UnknownPointError(place, "must be three numbers [x, y, z], m")
         if name not in self._points:
             raise _UnknownPointError(path, UnknownNameError("point", name, list(self._points)))
         local = frame[:3, :3].T @ (self._points[name] - frame[:3, 3])
@@ -169,7 +176,7 @@ class _Resolver:
             return np.eye(4)
 
     def _read_vector(self, value: Any) -> FloatArray | None:
-        """Return the numbers of a point, or None if they cannot be read, which is reported elsewhere."""
+        """Return the numbers of a point, or None if they cannot be read."""
         try:
             numbers = _VECTOR.validate_python(value, context=self._context)
         except ValidationError:

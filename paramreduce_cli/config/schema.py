@@ -155,6 +155,10 @@ class InputSection(Section):
         return self
 
 
+ROAD_PROFILE = "road profile"
+"""Name of a road's profile among files of signals, which no coordinate can have."""
+
+
 class MotionSection(Section):
     """A motion that an independent coordinate is forced to follow in a simulation: sines of time with random phases, or values of a file."""
 
@@ -244,9 +248,9 @@ class SimulationSection(Section):
         return [*self.motions, *wheels]
 
     def list_files(self) -> dict[str, Path]:
-        """Return the files of signals by the coordinate that they move; a road's under ``road``."""
+        """Return the files of signals by the coordinate that they move; a road's under :data:`ROAD_PROFILE`."""
         files = {name: motion.file for name, motion in self.motions.items()}
-        files |= {"road": None if self.road is None else self.road.file}
+        files |= {ROAD_PROFILE: None if self.road is None else self.road.file}
         return {name: path for name, path in files.items() if path is not None}
 
 

@@ -29,6 +29,8 @@ _MAPPINGS: dict[str, Key] = {
 """Parts of a subsystem that are mappings, and the mappings of the config that they are merged into."""
 _PARAMETERS = "parameters"
 _PRODUCTS = ("Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz")
+_USUAL_AXES = {"revolute": "z", "prismatic": "z", "universal": ["x", "y"]}
+"""Axes of joints where none are given, by the kind of the joint."""
 _NAMED = re.compile(r"^(-?)(to )?(\S+)$")
 """A named direction: x, -y, or to a point."""
 
@@ -41,6 +43,10 @@ def expand_subsystems(document: Document) -> list[Problem]:
     """
     data = document.data
     subsystems, uses = data.get("subsystems"), data.get("uses")
+    if uses and not subsystems:
+        return [(("uses",), "need subsystems, of which there are none")]
+    if subsystems and not uses:
+        return [(("subsystems",), "are not used; give uses, one entry for every use")]
     if not isinstance(subsystems, dict) or not isinstance(uses, list):
         return []
     problems: list[Problem] = []
@@ -144,6 +150,8 @@ class _Copy:
     def __init__(self, subsystem: Mapping[str, Any], suffix: str, mirror: Any) -> None:
         self._subsystem, self._suffix = subsystem, suffix
         self._flipped = "xyz".find(mirror) if isinstance(mirror, str) and mirror else -1
+        self._defaults: dict[str, str] = {}
+        """New default names of the coordinates of joints of several axes."""
         self._own = self._list_own_names()
 
     def write(self) -> dict[str, Any]:
@@ -152,7 +160,7 @@ class _Copy:
         result: dict[str, Any] = {
             "bodies": [self._write_body(body) for body in _list_dicts(parts.get("bodies"))],
             "closures": [self._write_element(one) for one in _list_dicts(parts.get("closures"))],
-            "independent": [self._rename(name) for name in parts.get("independent") or []],
+            "independent": [self._rename(name) for name in _as_list(parts.get("independent"))],
         }
         writers: dict[str, Callable[[Any], Any]] = {
             "points": self._mirror_vector,
@@ -168,20 +176,24 @@ class _Copy:
         return result
 
     def _list_own_names(self) -> set[str]:
-        """Return the names that are of the subsystem, and not of the rest of the config."""
+        """Return the names that are of the subsystem, and not of the rest of the config; fill in new default names."""
         own: set[str] = set()
         for part in ("points", "drives", "forces"):
             given = self._subsystem.get(part)
             own |= set(given) if isinstance(given, dict) else set()
         for body in _list_dicts(self._subsystem.get("bodies")):
             name, coordinates = str(body.get("name")), body.get("coordinates") or []
-            own |= {name, f"q_{name}"} | {f"q_{name}_{k}" for k in range(1, 7)}
+            own |= {name, f"q_{name}"}
+            defaults = range(1, 7) if not coordinates else ()
+            self._defaults |= {f"q_{name}_{k}": f"q_{name}{self._suffix}_{k}" for k in defaults}
             own |= set(map(str, coordinates if isinstance(coordinates, list) else [coordinates]))
         own |= {str(one.get("name")) for one in _list_dicts(self._subsystem.get("closures"))}
         return own
 
     def _rename(self, name: Any) -> Any:
         """Return a name with the suffix if it is one of the subsystem."""
+        if str(name) in self._defaults:
+            return self._defaults[str(name)]
         return f"{name}{self._suffix}" if str(name) in self._own else name
 
     def _write_body(self, body: dict[str, Any]) -> dict[str, Any]:
@@ -195,9 +207,10 @@ class _Copy:
             renamed["coordinates"] = [self._rename(name) for name in names]
         if "at" in body:
             renamed["at"] = self._write_placement(body["at"])
-        if "axes" in body:
-            slides = body.get("joint") == "prismatic"
-            renamed["axes"] = self._write_axes(body["axes"], slides)
+        joint = body.get("joint", "revolute")
+        axes = body.get("axes", _USUAL_AXES.get(str(joint)) if self._flipped >= 0 else None)
+        if axes is not None:
+            renamed["axes"] = self._write_axes(axes, joint == "prismatic")
         return body | renamed
 
     def _write_element(self, element: Any) -> Any:
@@ -307,6 +320,11 @@ class _Copy:
 def _list_dicts(value: Any) -> list[dict[str, Any]]:
     """Return the mappings in a list, none if the value is no list."""
     return [one for one in value if isinstance(one, dict)] if isinstance(value, list) else []
+
+
+def _as_list(value: Any) -> list[Any]:
+    """Return a list, or a single value as one; an empty list if there is nothing."""
+    return value if isinstance(value, list) else [] if value is None else [value]
 
 
 def _is_number(value: Any) -> bool:

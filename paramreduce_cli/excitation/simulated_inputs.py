@@ -4,15 +4,12 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from paramreduce_cli.config.schema import InputSection, RoadSection, SimulationSection
+from paramreduce_cli.config.schema import ROAD_PROFILE, InputSection, RoadSection, SimulationSection
 from paramreduce_cli.errors import DataError
 from paramreduce_cli.excitation.input_signals import Harmonics, Interpolated, Joined, Signals
 from paramreduce_cli.excitation.road import ROUGHNESS, draw_road
 from paramreduce_cli.excitation.simulation import Inputs
 from paramreduce_cli.records import FloatArray, SignalTable, SignalTables
-
-ROAD = "road"
-"""Name of the table of a road's profile among the tables of signals."""
 
 
 def make_inputs(
@@ -96,8 +93,9 @@ def _make_road(
     """
     if road.file is None:
         roughness = ROUGHNESS[road.roughness] if isinstance(road.roughness, str) else road.roughness
-        return draw_road(roughness, road.speed, road.distances, road.width, rng)
-    table, longest = tables[ROAD], max(road.distances)
+        width = road.width if len(road.tracks) > 1 else None
+        return draw_road(roughness, road.speed, road.distances, width, rng)
+    table, longest = tables[ROAD_PROFILE], max(road.distances)
     if table.values.shape[1] < len(road.tracks):
         raise DataError(
             f"{table.source}: has {table.values.shape[1]} heights at each distance, but there are "

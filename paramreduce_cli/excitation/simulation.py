@@ -5,6 +5,7 @@ what it takes. States are those of the full model's forward dynamics; accelerati
 that torques and states fit each other to round-off whatever the integration's error.
 """
 
+import contextlib
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
@@ -186,14 +187,17 @@ def find_equilibrium(dynamics: MassAndBias, inputs: Inputs, start: FloatArray) -
     dynamics.restart()
     values = z[free]
     imbalance = compute_imbalance(values)
+    if not np.isfinite(imbalance).all():
+        raise DataError("forces at the start are not finite; give another start.")
     first = float(np.abs(imbalance).max(initial=0.0)) or 1.0
     for _ in range(_CORRECTIONS):
         step = _find_least_step(compute_imbalance, values, imbalance)
         step *= min(1.0, _LONGEST / max(float(np.abs(step).max(initial=0.0)), _LONGEST))
         while np.abs(step).max(initial=0.0) > _SHORTEST:
-            moved = compute_imbalance(values + step)
-            if np.linalg.norm(moved) < np.linalg.norm(imbalance):
-                break
+            with contextlib.suppress(DataError):  # beyond the reach of the loops
+                moved = compute_imbalance(values + step)
+                if np.linalg.norm(moved) < np.linalg.norm(imbalance):
+                    break
             step = step / 2
         else:
             break

@@ -23,6 +23,8 @@ from paramreduce_cli.records import FloatArray, Mechanism
 
 _SAMPLES = 300
 """Random states on which the order of pivots is chosen."""
+_SMALLEST = 1e-6
+"""Pivot below which none is trusted."""
 _SMALLER = 0.1
 """Share of the smallest pivot on the samples from which on a pivot is trusted."""
 
@@ -76,7 +78,8 @@ class LoopKinematics:
     @property
     def least_pivots(self) -> FloatArray:
         """Magnitudes below which the pivots are not trusted, in their order, (n_d,)."""
-        return np.array([_SMALLER * pivot.least for block in self._blocks for pivot in block])
+        least = np.array([pivot.least for block in self._blocks for pivot in block])
+        return np.maximum(_SMALLER * least, _SMALLEST)
 
     def make_problems(self) -> tuple[Function, ...]:
         """Return the functions of the position, velocity and acceleration problems."""

@@ -45,7 +45,7 @@ class SignalTable:
 
 @record
 class SignalTables:
-    """Signals from the user's files, by coordinate; a road's profile under ``road``."""
+    """Signals from the user's files, by coordinate; a road's profile under ``road profile``."""
 
     tables: Mapping[str, SignalTable]
 

@@ -181,13 +181,17 @@ class Robot(Section):
         """Return all drives by name."""
         return merge_drives(self.drives, self.description.bodies.list_driven_coordinates())
 
-    def list_forces(self) -> list[ForceAlong]:
-        """Return the forces of all force elements, each along one motion."""
+    def make_names(self) -> Names:
+        """Return the indices of bodies and coordinates by name."""
         bodies = self.description.bodies
         rigid = bodies.build_bodies()
         index = {"base": BASE} | {body.name: k for k, body in enumerate(rigid)}
         slides = frozenset(body.coordinate for body in rigid if body.joint == "prismatic")
-        names = Names(index, bodies.list_coordinates(), slides)
+        return Names(index, bodies.list_coordinates(), slides)
+
+    def list_forces(self) -> list[ForceAlong]:
+        """Return the forces of all force elements, each along one motion."""
+        names = self.make_names()
         return [
             force
             for name, section in self.forces.items()

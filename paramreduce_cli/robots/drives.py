@@ -150,17 +150,11 @@ class DriveSection(ForceParameters):
     def is_along_line(self, name: str, slides: Collection[str]) -> bool:
         """Return whether the motion is in m and not in rad.
 
-        A weighted sum of sliding and turning coordinates has the unit of those whose weight is one: of the sliding ones
-        if both have it, as where a point moves with a body that also turns.
-
         Args:
             name: Name of the drive.
             slides: Names of the coordinates that slide.
         """
-        motion = self.motion or {name: 1.0}
-        sliding = [coordinate in slides for coordinate in motion]
-        plain = [slide for slide, w in zip(sliding, motion.values(), strict=True) if abs(w) == 1]
-        return all(sliding) or any(plain) or (any(sliding) and not plain)
+        return is_along_line(self.motion or {name: 1.0}, slides)
 
     def merge_defaults(self, other: DriveSection | None) -> DriveSection:
         """Return the section with missing keys taken from another one."""
@@ -183,6 +177,21 @@ class DriveSection(ForceParameters):
         if self.friction == "auto" and "smoothing" not in self.model_fields_set:
             characteristic["smoothing"] = _PROVISIONAL_SMOOTHING
         return Drive(name, weights, **characteristic)
+
+
+def is_along_line(motion: Mapping[str, float], slides: Collection[str]) -> bool:
+    """Return whether a weighted sum of coordinates is in m and not in rad.
+
+    A sum of sliding and turning coordinates has the unit of those whose weight is one: of the sliding ones if both have
+    it, as where a point moves with a body that also turns.
+
+    Args:
+        motion: Weights by coordinate.
+        slides: Names of the coordinates that slide.
+    """
+    sliding = [coordinate in slides for coordinate in motion]
+    plain = [slide for slide, w in zip(sliding, motion.values(), strict=True) if abs(w) == 1]
+    return all(sliding) or any(plain) or (any(sliding) and not plain)
 
 
 def merge_drives(

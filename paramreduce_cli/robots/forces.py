@@ -13,7 +13,7 @@ from paramreduce_cli.fields.names import Problem, UnknownNameError
 from paramreduce_cli.fields.numbers import Number
 from paramreduce_cli.fields.section import Name, Positive, Section
 from paramreduce_cli.records import Drive, FloatArray, Kind, MotionBetween, MotionKind
-from paramreduce_cli.robots.drives import ForceParameters, Table, Value
+from paramreduce_cli.robots.drives import ForceParameters, Table, Value, is_along_line
 from paramreduce_cli.robots.placement import ONE_PLACE_OR_TWO, Placement, compose_steps
 
 _AXES = ("x", "y", "z", "rx", "ry", "rz")
@@ -236,7 +236,7 @@ class Contact(ForceElement):
         """Return the force along the motion."""
         creepage = np.stack([_make_weights(some, names) for some in (self.positions, self.speeds)])
         drive = Drive(name, _make_weights(self.motion, names), creepage=creepage)
-        sliding = any(names.slides.issuperset([c]) for c, w in self.motion.items() if abs(w) == 1)
+        sliding = is_along_line(self.motion, names.slides)
         return [ForceAlong(drive, {Kind.CREEP: _get_number(self.creep)}, sliding)]
 
     def list_unknown(self) -> list[str]:

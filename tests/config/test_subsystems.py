@@ -50,6 +50,13 @@ def load(tmp_path, text, **values):
 @pytest.mark.parametrize("axis", "xyz")
 def test_a_mirrored_side_has_the_same_torques_at_the_same_coordinates(tmp_path, axis):
     config = load(tmp_path, MIRRORED, axis=axis)
+    check_mirrored(config)
+    names = config.build_mechanism().generalised_names
+    assert names[1:5] == ("q_thigh_l", "q_rod_l", "wrist_l", "q_eyed_l")
+
+
+def check_mirrored(config):
+    """Both sides have the same torques at the same coordinates, and mirrored poses."""
     mechanism, values = config.build_mechanism(), config.get_values()
     rng = np.random.default_rng(1)
     n = (mechanism.n_q - 1) // 2
@@ -57,9 +64,6 @@ def test_a_mirrored_side_has_the_same_torques_at_the_same_coordinates(tmp_path, 
     trunk = rng.normal(size=(3, 20, 1))
     states = np.concatenate([trunk, left, left], axis=2)
     tau = Dynamics(mechanism).compute_torques(*states, values)
-    assert mechanism.generalised_names[1 : 1 + n] == (
-        "q_thigh_l", "q_rod_l", "wrist_l", "q_eyed_l",
-    )  # fmt: skip
     np.testing.assert_allclose(tau[:, 1 : 1 + n], tau[:, 1 + n :], rtol=1e-11, atol=1e-11)
     assert np.abs(tau[:, 1:]).max() > 1
     poses = compute_body_poses(mechanism, states[0, 0])
@@ -146,3 +150,37 @@ def test_a_setting_reaches_one_side_alone(tmp_path):
     changed = {name for name, value in values[0].items() if value != values[1][name]}
     assert {"m_hand_r", "mx_hand_r"} <= changed
     assert all(name.endswith("hand_r") for name in changed)
+
+
+@pytest.mark.parametrize("joint", ["revolute", "prismatic", "universal"])
+def test_joints_without_axes_are_mirrored_too(tmp_path, joint):
+    body = "{{name: rod, parent: thigh, joint: prismatic, axes: [0.2, 0.5, -0.1], "
+    text = MIRRORED.replace(body, f"{{{{name: rod, parent: thigh, joint: {joint}, ")
+    check_mirrored(load(tmp_path, text, axis="x"))
+
+
+def test_default_coordinates_of_several_axes_are_renamed(tmp_path):
+    body = "{{name: rod, parent: thigh, joint: prismatic, axes: [0.2, 0.5, -0.1], "
+    text = MIRRORED.replace(body, "{{name: rod, parent: thigh, joint: universal, ")
+    text = text.replace("motion: {{q_thigh: 1, wrist: -2}}", "motion: {{q_rod_2: 1}}")
+    mechanism = load(tmp_path, text, axis="x").build_mechanism()
+    weights = {d.name: np.flatnonzero(d.weights).tolist() for d in mechanism.drives}
+    names = mechanism.generalised_names
+    assert weights["both_l"] == [names.index("q_rod_l_2")]
+    assert weights["both_r"] == [names.index("q_rod_r_2")]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "says"),
+    [
+        ("uses:\n  - {{subsystem: arm, suffix: _l}}\n  - {{subsystem: arm, suffix: _r, mirror: y}}\n",
+         "", "are not used"),
+        ("knee: [0.3, w + 0.5, 0.1]", "knee: [0.3, w + 0.5]", "must be three numbers"),
+        ("    drives:\n", "    independent: 5\n    drives:\n", "independent"),
+    ],
+)  # fmt: skip
+def test_parts_of_another_form_are_said(tmp_path, old, new, says):
+    assert MIRRORED.count(old) == 1
+    with pytest.raises(ConfigError) as caught:
+        load(tmp_path, MIRRORED.replace(old, new), axis="x")
+    assert says in str(caught.value)

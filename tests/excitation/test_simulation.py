@@ -231,6 +231,10 @@ def test_a_road_from_a_file_is_met_with_delay(invoke, tmp_path):
           ("motion: {car: 1, wheel: -1}, stiffness: 2e4", "motion: {car: 1, wheel: -1}, stiffness: 0")],
          "there is no static equilibrium"),
         ([("{amplitude: 0.02, frequencies: [1.3]}", "{file: short.csv}")], "holds 0 to 1 s"),
+        ([("{amplitude: 0.02, frequencies: [1.3]}", "{file: holes.csv}")], "row 3 has a number that is not"),
+        ([("speed: {trolley: 2}", "speed: {ground: 2}")], "whose motion is prescribed"),
+        ([("motions: {ground", "motions: {wheel: {}, car: {}, trolley: {}, ground"),
+          ("    speed: {trolley: 2}\n", "")], "prescribes the motion of all coordinates"),
         ([("ground: {amplitude", "gruond: {amplitude")], "Did you mean ground?"),
         ([("    step: 0.01\n", "    step: 0.01\n    inputs: {ground: {amplitude: 1, frequencies: [1]}}\n")],
          "whose motion is prescribed"),
@@ -241,6 +245,9 @@ def test_a_road_from_a_file_is_met_with_delay(invoke, tmp_path):
 def test_vehicles_that_cannot_be_simulated_are_refused(invoke, tmp_path, changes, says):
     np.savetxt(tmp_path / "short.csv", np.linspace([0, 0], [1, 0.1], 20), delimiter=",",
                header="time,height", comments="")  # fmt: skip
+    (tmp_path / "holes.csv").write_text(
+        "time,height\n" + "".join(f"{k},{'nan' if k == 2 else 0}\n" for k in range(20))
+    )
     path = write_sprung(tmp_path, *changes)
     out = invoke("run", path, "--results", tmp_path, code=2)
     assert says in " ".join(out.err.split())

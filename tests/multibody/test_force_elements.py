@@ -229,3 +229,33 @@ def test_what_is_wrong_is_said(tmp_path, old, new, says):
     with pytest.raises(ConfigError, match="line") as caught:
         load_config(path)
     assert says in str(caught.value)
+
+
+def test_a_line_along_one_axis_has_both_directions(tmp_path):
+    path = tmp_path / "posts.yaml"
+    path.write_text(
+        """
+robot: posts
+description:
+  tree:
+    bodies:
+      - {name: low, joint: prismatic, coordinates: a}
+      - {name: high, joint: prismatic, coordinates: b}
+parameter_sets: {p: {low: {m: 1}, high: {m: 2}}}
+forces: {spring: {type: line, bodies: [low, high], at: [[0, 0, 0], [0, 0, 0]], stiffness: 10, rest: 0.3}}
+nominal_torque: 1
+trajectories: {position_limits: [-1, 1], velocity_limits: 1}
+"""
+    )
+    mechanism = load_config(path).build_mechanism()
+    q = np.array([[0.1, 0.7], [0.7, 0.1]])
+    K = Dynamics(mechanism).compute_regressor(q, 0 * q, 0 * q)
+    np.testing.assert_allclose(K[0, :, -1], [-0.3, 0.3])
+    np.testing.assert_allclose(K[1, :, -1], [0.3, -0.3])
+
+
+def test_names_of_parts_of_force_elements_are_their_own(tmp_path):
+    path = tmp_path / "sprung.yaml"
+    path.write_text(CONFIG.replace("  creep: {type", "  mount_z: {type"))
+    with pytest.raises(ConfigError, match="a name that is taken"):
+        load_config(path)
