@@ -6,7 +6,7 @@ with the suffix of the use. The lines of the file stay known, so that messages n
 
 import copy
 import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from paramreduce_cli.config.yaml_reading import Document
@@ -339,8 +339,3 @@ def _negate(value: Any) -> Any:
     if isinstance(value, int | float) and not isinstance(value, bool):
         return -value
     return f"-({value})" if isinstance(value, str) else value
-
-
-def list_copies(subsystems: Iterable[str], uses: Any) -> dict[str, list[str]]:
-    """Return the suffixes under which each subsystem is used, by its name."""
-    return {name: [use.suffix for use in uses if use.subsystem == name] for name in subsystems}

@@ -175,7 +175,7 @@ def find_equilibrium(dynamics: MassAndBias, inputs: Inputs, start: FloatArray) -
     free, z = inputs.free, start.copy()
     z[inputs.prescribed] = inputs.motions(0.0)[0]
     still = np.zeros_like(z)
-    feedback = replace_forces(inputs)
+    feedback = _remove_forces(inputs)
 
     def compute_imbalance(values: FloatArray) -> FloatArray:
         """Return the forces that are missing at a position, (n_free,)."""
@@ -229,7 +229,7 @@ def _find_least_step(
     return np.asarray(-(left[:, stiff].T @ imbalance) / stiffness[stiff] @ right[stiff])
 
 
-def replace_forces(inputs: Inputs) -> Inputs:
+def _remove_forces(inputs: Inputs) -> Inputs:
     """Return the inputs with feedback alone, without forces that change with time."""
     passive = Inputs.make_passive(inputs.stiffness.size)
     return Inputs(
