@@ -41,13 +41,13 @@ def resolve_points(document: Document, constants: Mapping[str, float]) -> list[P
     try:
         resolver.resolve_tree(tree)
         resolver.resolve_elements(document.data)
-    except _UnknownPointError as error:
+    except _PointError as error:
         return [(error.path, error.problem)]
     return []
 
 
-class _UnknownPointError(Exception):
-    """Raised where the name of a point is unknown."""
+class _PointError(Exception):
+    """Raised where the name of a point cannot be replaced by numbers."""
 
     def __init__(self, path: Key, problem: str | UnknownNameError) -> None:
         super().__init__(str(problem))
@@ -152,7 +152,7 @@ class _Resolver:
         sign, name = found.groups()
         direction = np.array(self._locate(name, frame, path)) * (-1.0 if sign else 1.0)
         if not direction.any():
-            raise _UnknownPointError(
+            raise _PointError(
                 path,
                 f"the joint is at the point {name} itself, so that there is no direction to it",
             )
@@ -162,9 +162,9 @@ class _Resolver:
         """Return a named point in a frame whose place in the base is given, (3,), m."""
         if name in self._unreadable:
             place: Key = (*_TREE, "points", name)
-            raise _UnknownPointError(place, "must be three numbers [x, y, z], m")
+            raise _PointError(place, "must be three numbers [x, y, z], m")
         if name not in self._points:
-            raise _UnknownPointError(path, UnknownNameError("point", name, list(self._points)))
+            raise _PointError(path, UnknownNameError("point", name, list(self._points)))
         local = frame[:3, :3].T @ (self._points[name] - frame[:3, 3])
         return [float(x) + 0.0 for x in np.round(local, _DIGITS)]
 

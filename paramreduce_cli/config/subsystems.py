@@ -160,7 +160,7 @@ class _Copy:
         result: dict[str, Any] = {
             "bodies": [self._write_body(body) for body in _list_dicts(parts.get("bodies"))],
             "closures": [self._write_element(one) for one in _list_dicts(parts.get("closures"))],
-            "independent": [self._rename(name) for name in _as_list(parts.get("independent"))],
+            "independent": [self._rename(name) for name in _wrap_in_list(parts.get("independent"))],
         }
         writers: dict[str, Callable[[Any], Any]] = {
             "points": self._mirror_vector,
@@ -322,7 +322,7 @@ def _list_dicts(value: Any) -> list[dict[str, Any]]:
     return [one for one in value if isinstance(one, dict)] if isinstance(value, list) else []
 
 
-def _as_list(value: Any) -> list[Any]:
+def _wrap_in_list(value: Any) -> list[Any]:
     """Return a list, or a single value as one; an empty list if there is nothing."""
     return value if isinstance(value, list) else [] if value is None else [value]
 

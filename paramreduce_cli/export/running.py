@@ -214,6 +214,8 @@ class CompiledForwardDynamics:
     def __call__(self, z: FloatArray, dz: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return M, (n_dof, n_dof), and delta, (n_dof,), at positions z and velocities dz, (n_dof,) each.
 
+        With loops, the next call overwrites both arrays.
+
         Raises:
             DataError: The loops cannot be closed.
         """

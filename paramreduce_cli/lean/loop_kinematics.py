@@ -88,21 +88,21 @@ class LoopKinematics:
 
     def make_newton(self) -> Function:
         """Return the function that gives Newton's correction of the position problem."""
-        graph, (q,) = self._start(self._q)
+        graph, (q,) = self._make_inputs(self._q)
         _, _, elimination = self._eliminate(graph, q)
         gap = self._evaluate("equations", graph, q)
         step = [-x for x in elimination.solve(gap)]
         text = "Newton's correction of the dependent coordinates."
-        return _finish(
+        return _make_function(
             "newton", text, [self._q], [self._step, self._pivots], step, elimination.pivots
         )
 
     def make_velocities(self) -> Function:
         """Return the function that gives R and all velocities."""
-        graph, (q, dz) = self._start(self._q, self._dz)
+        graph, (q, dz) = self._make_inputs(self._q, self._dz)
         tangent, elimination = self._solve_tangent(graph, q)
         rates = self._interleave(_multiply(tangent, dz), dz)
-        return _finish(
+        return _make_function(
             "velocity_problem", "Velocities of all coordinates.", [self._q, self._dz],
             [self._R, self._dq, self._pivots], [x for row in tangent for x in row], rates, elimination.pivots,
         )  # fmt: skip
@@ -110,13 +110,13 @@ class LoopKinematics:
     def make_accelerations(self) -> Function:
         """Return the function that gives b and all accelerations for a known R."""
         arguments = [self._q, self._dq, self._R, self._ddz]
-        graph, (q, dq, flat, ddz) = self._start(*arguments)
+        graph, (q, dq, flat, ddz) = self._make_inputs(*arguments)
         _, _, elimination = self._eliminate(graph, q)
         drift = elimination.solve(self._evaluate("gamma", graph, [*q, *dq]))
         n_z = len(self._z)
         tangent = [flat[k : k + n_z] for k in range(0, len(flat), n_z)]
         rates = self._interleave(_add(_multiply(tangent, ddz), drift), ddz)
-        return _finish(
+        return _make_function(
             "acceleration_problem", "Accelerations of all coordinates.", arguments,
             [self._b, self._ddq, self._pivots], drift, rates, elimination.pivots,
         )  # fmt: skip
@@ -124,18 +124,18 @@ class LoopKinematics:
     def make_rates(self) -> Function:
         """Return the function that gives R, b, all velocities and all accelerations at once."""
         arguments = [self._q, self._dz, self._ddz]
-        graph, (q, dz, ddz) = self._start(*arguments)
+        graph, (q, dz, ddz) = self._make_inputs(*arguments)
         tangent, elimination = self._solve_tangent(graph, q)
         dq = self._interleave(_multiply(tangent, dz), dz)
         drift = elimination.solve(self._evaluate("gamma", graph, [*q, *dq]))
         ddq = self._interleave(_add(_multiply(tangent, ddz), drift), ddz)
-        return _finish(
+        return _make_function(
             "rate_problem", "Velocities and accelerations of all coordinates.", arguments,
             [self._R, self._b, self._dq, self._ddq, self._pivots],
             [x for row in tangent for x in row], drift, dq, ddq, elimination.pivots,
         )  # fmt: skip
 
-    def _start(self, *arguments: Argument) -> tuple[Graph, list[list[Scalar]]]:
+    def _make_inputs(self, *arguments: Argument) -> tuple[Graph, list[list[Scalar]]]:
         """Return a new graph, and the elements of the arguments as its inputs."""
         graph, start, elements = Graph(), 0, []
         for argument in arguments:
@@ -199,7 +199,7 @@ def _add(a: Sequence[Scalar], b: Sequence[Scalar]) -> list[Scalar]:
     return [x + y for x, y in zip(a, b, strict=True)]
 
 
-def _finish(
+def _make_function(
     name: str,
     text: str,
     arguments: Sequence[Argument],

@@ -152,7 +152,7 @@ class Tyre(_BetweenBodies, ForceElement):
     viscous: Value | None = None
     """Vertical damping, N s/m."""
     spring_table: Table | None = None
-    """Points [height of the centre less `radius`, vertical force], m, N, instead of a stiffness; [[-1, -2e5], [0, 0], [1, 0]] is a tyre that lifts off."""
+    """Points [height of the centre less `radius`, vertical force], m, N; it adds to a stiffness; [[-1, -2e5], [0, 0], [1, 0]] is a tyre that lifts off."""
     cornering: Value | None = None
     """Cornering stiffness: the lateral force per side slip, N."""
     longitudinal: Value | None = None
