@@ -10,10 +10,12 @@ from collections.abc import Callable, Mapping
 import numpy as np
 
 from paramreduce_cli.errors import DataError, ParamreduceWarning
+from paramreduce_cli.excitation.simulation import MassAndBias, TextbookMassAndBias
 from paramreduce_cli.export.code_generation import Exported, make_exported_model
 from paramreduce_cli.export.exported_model import ExportedModel
 from paramreduce_cli.expressions.compiled import get_address, load
 from paramreduce_cli.expressions.functions import Argument, Function
+from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.records import (
     FloatArray,
     LoopEvaluation,
@@ -231,6 +233,18 @@ class CompiledForwardDynamics:
                 "end of its reach"
             )
         return self._M[0], self._delta[0]
+
+
+def make_forward_dynamics(compiled: CompiledModel, standard: FloatArray) -> MassAndBias:
+    """Return the mass matrix and bias of a model: its compiled code, or the regressor without a compiler.
+
+    Args:
+        compiled: The model, with its direct dynamics.
+        standard: All standard parameters of the model, (n_parameters,).
+    """
+    if compiled.library is None:
+        return TextbookMassAndBias(Dynamics(compiled.mechanism), standard)
+    return CompiledForwardDynamics(compiled)
 
 
 def evaluate_loops(

@@ -87,6 +87,7 @@ from paramreduce_cli.records.samples import (
     SignalTable,
     SignalTables,
 )
+from paramreduce_cli.records.simulated_manoeuvre import SimulatedManoeuvre
 from paramreduce_cli.records.terms import (
     NO_OPERAND,
     TERMS,

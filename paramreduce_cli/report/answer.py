@@ -42,6 +42,8 @@ class Answer:
     """Symbols of the functions whose operations are counted."""
     nanoseconds: tuple[str, str]
     """Times of one evaluation of both functions, beside the full model; empty if they were not measured."""
+    manoeuvre: str
+    """Deviations of the selected model in a simulated manoeuvre; empty if there is none."""
     loops: str
     """Operations and time of the whole evaluation of closed loops; empty without loops."""
     as_identified: bool
@@ -75,6 +77,7 @@ def gather_answer(data: ReportData, options: str) -> Answer:
             _describe_speed(data, data.speed, "d_z with R"),
             _describe_speed(data, data.speed_direct, "[M_zz | δ_z] with R and b"),
         ),
+        manoeuvre=_describe_manoeuvre(data),
         loops=_describe_loops(data),
         as_identified=_has_identified_values(data),
         weighted=_WEIGHTED[data.weighting],
@@ -200,6 +203,20 @@ def _find_worst_joint(data: ReportData) -> str:
 def _format_two_digits(value: float) -> str:
     """Return a number with two digits and without an exponent, like the rating of a motor."""
     return np.format_float_positional(value, precision=2, fractional=False, trim="-")
+
+
+def _describe_manoeuvre(data: ReportData) -> str:
+    """Return a sentence on the deviation of the selected model in a simulated manoeuvre."""
+    result = data.manoeuvre
+    if result is None:
+        return ""
+    deviations = result.compute_deviations("position")
+    worst = int(deviations.argmax())
+    return (
+        f"deviation of the positions from the full model in a simulated manoeuvre of the {result.set_name} set, rms over time; "
+        f"at most {format_percent(float(deviations[worst]))}, of {result.names[worst]}; accelerations "
+        f"{format_percent(result.compute_error('acceleration'))}"
+    )
 
 
 def _describe_loops(data: ReportData) -> str:

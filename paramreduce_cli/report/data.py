@@ -14,6 +14,7 @@ from paramreduce_cli.records import (
     Model,
     ReducedModel,
     Samples,
+    SimulatedManoeuvre,
     Speed,
     Tracking,
 )
@@ -75,6 +76,10 @@ class ReportData(Artifacts):
     """Operations and time of the kinematics of closed loops; None without loops."""
     tracking: Tracking | None
     """Simulated control; None if it was not requested."""
+    manoeuvre: SimulatedManoeuvre | None
+    """A simulated manoeuvre of the full and of the selected model; None where samples are not simulated, or the selected
+    model cannot be.
+    """
 
     @property
     def n_affecting(self) -> int:
@@ -96,6 +101,11 @@ class ReportData(Artifacts):
         mechanism = self.model.mechanism
         kind = mechanism.bodies[mechanism.independent[joint]].joint
         return "N m" if kind == "revolute" else "N"
+
+    def find_length_unit(self, coordinate: str) -> str:
+        """Return the unit of an independent coordinate of the robot: rad or m."""
+        joint = self.robot_model.mechanism.coordinate_names.index(coordinate)
+        return "rad" if self.find_force_unit(joint) == "N m" else "m"
 
     def name_joint(self, joint: int) -> str:
         """Return the name of a joint's coordinate."""

@@ -60,6 +60,14 @@ class PageSection(Enum):
         "one period.",
         True,
     )
+    MANOEUVRE = (
+        "Simulated manoeuvre",
+        "The first manoeuvre of the test set (validation set without one), simulated with all and with the selected "
+        "parameters: under the same inputs, each from its own start. Deviations are root mean squares over time, relative to "
+        "those of the full model's motion.",
+        True,
+        True,
+    )
     ACCELERATIONS = ("Accelerations and mass matrix", "", True)
     MECHANISM = ("Mechanism", "", True)
     BASE = (

@@ -22,6 +22,7 @@ from paramreduce_cli.records import (
     Provenance,
     Reduction,
     SetErrors,
+    SimulatedManoeuvre,
     Subsets,
     TermFront,
     TermModel,
@@ -36,6 +37,7 @@ def gather_summary(
     artifacts: Artifacts,
     leanest: Mapping[str, Leanest],
     loops: LoopEvaluation | None,
+    manoeuvre: SimulatedManoeuvre | None,
     provenance: Provenance,
 ) -> dict[str, Any]:
     """Gather the numbers of all artifacts as plain data; infinite numbers become None, and so do those of a mechanism
@@ -45,6 +47,7 @@ def gather_summary(
         artifacts: Artifacts of all stages.
         leanest: The leanest models within the limits, by function.
         loops: Operations of the kinematics of closed loops; None without loops.
+        manoeuvre: Simulated manoeuvre; None if there is none.
         provenance: Origin of the artifacts.
     """
     model, reduction, validation = artifacts.model, artifacts.reduction, artifacts.validation
@@ -73,6 +76,7 @@ def gather_summary(
         },
         "full": dict(validation.full),
         "loops": _summarise_loops(loops),
+        "manoeuvre": _summarise_manoeuvre(manoeuvre),
         "identification": _summarise_identification(artifacts.identification),
         "terms": _summarise_terms(model, artifacts.terms),
         "selected": {
@@ -107,6 +111,22 @@ def _summarise_loops(loops: LoopEvaluation | None) -> dict[str, Any] | None:
         "rates": loops.rates,
         "whole_full": full,
         "whole_selected": selected,
+    }
+
+
+def _summarise_manoeuvre(manoeuvre: SimulatedManoeuvre | None) -> dict[str, Any] | None:
+    """Return the deviations of the selected model in a simulated manoeuvre; None if there is none."""
+    if manoeuvre is None:
+        return None
+    quantities = ("position", "acceleration")
+    each = {quantity: manoeuvre.compute_deviations(quantity) for quantity in quantities}
+    return {
+        "set": manoeuvre.set_name,
+        **{f"{quantity}_error": manoeuvre.compute_error(quantity) for quantity in quantities},
+        "coordinates": {
+            name: {f"{quantity}_error": each[quantity][k] for quantity in quantities}
+            for k, name in enumerate(manoeuvre.names)
+        },
     }
 
 

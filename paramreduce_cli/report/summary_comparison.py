@@ -235,6 +235,15 @@ def _iterate_subsets(heuristic: Mapping[str, Any]) -> Iterator[tuple[int, list[s
         yield n, heuristic["subsets"][k] if heuristic["order"] is None else heuristic["order"][:n]
 
 
+def _compare_loops(
+    a: Summary, b: Summary, tolerances: Mapping[str, Tolerance]
+) -> Iterator[Difference]:
+    """Compare the operations of the kinematics of closed loops, which older summaries lack."""
+    x, y = a.get("loops"), b.get("loops")
+    if x and y:
+        yield from _compare_rows("closed loops", "operations", x, y, tolerances["operations"])
+
+
 def _compare_proofs(
     a: Summary, b: Summary, tolerances: Mapping[str, Tolerance]
 ) -> Iterator[Difference]:
@@ -324,6 +333,7 @@ QUANTITIES: dict[str, Quantity] = {
     "torque_error": _compare_numbers("torque_error"),
     "acceleration_error": _compare_numbers("acceleration_error"),
     "operations": _compare_numbers("operations"),
+    "loops": _compare_loops,
     "mass_matrix": _compare_numbers("mass_matrix"),
     "selected": _compare_selected,
     "terms": _compare_terms,

@@ -11,8 +11,10 @@ from paramreduce_cli.config.schema import (
     ReportSection,
     SamplingSection,
     SelectedSection,
+    SimulationSection,
 )
 from paramreduce_cli.errors import ConfigError, DataError, FormulationError, ParamreduceWarning
+from paramreduce_cli.excitation.manoeuvres import draw_manoeuvres
 from paramreduce_cli.export.code_generation import make_exported_model
 from paramreduce_cli.export.exported_model import ExportedModel
 from paramreduce_cli.export.languages import languages
@@ -22,6 +24,7 @@ from paramreduce_cli.export.running import (
     RunningModel,
     compile_model,
     evaluate_loops,
+    make_forward_dynamics,
     measure_speeds,
 )
 from paramreduce_cli.fields.section import expand_per_joint
@@ -42,6 +45,8 @@ from paramreduce_cli.records import (
     Run,
     Samples,
     Selected,
+    SignalTables,
+    SimulatedManoeuvre,
     Tracking,
     Validation,
 )
@@ -82,6 +87,7 @@ def report(
     counted: CountedDynamics,
     artifacts: Artifacts,
     samples: Samples,
+    signals: SignalTables | None,
     provenance: Provenance,
     run: Run,
 ) -> Report:
@@ -122,13 +128,14 @@ def report(
         speed_direct=measure_speeds(direct, states) if direct else None,
         loops=_evaluate_loops(model, compiled, motion),
         tracking=_simulate_tracking(section, model, running, motion),
+        manoeuvre=_simulate_manoeuvre(sampling.simulation, model, compiled, selected, signals),
     )
     lean = {
         name: found
         for name in (("inverse", "direct") if model is not None else ())
         if (found := find_leanest(name, limits, validation.heuristics, artifacts.terms)) is not None
     }
-    summary = gather_summary(artifacts, lean, data.loops, provenance)
+    summary = gather_summary(artifacts, lean, data.loops, data.manoeuvre, provenance)
     formats = [str(name) for name in section.formats]
     drawn = [name for name, _ in _list_shown(figures, model)]
 
@@ -217,6 +224,41 @@ def _simulate_tracking(
     if section.tracking is None or model is None or not running:
         return None
     return simulate_tracking(section.tracking, model, running, motion.z, motion.dz)
+
+
+def _simulate_manoeuvre(
+    section: SimulationSection | None,
+    model: Model | None,
+    compiled: Mapping[str, CompiledModel],
+    selected: Selected,
+    signals: SignalTables | None,
+) -> SimulatedManoeuvre | None:
+    """Return a manoeuvre of the full and of the selected model; None where samples are not simulated.
+
+    Where the selected model cannot be simulated, a warning says why.
+    """
+    if section is None or model is None or not compiled:
+        return None
+    name = "test" if section.test_runs else "validation"
+    tables = signals or SignalTables({})
+    manoeuvre = next(draw_manoeuvres(section, model.mechanism, tables, name))
+    values = model.values, selected.model.standard
+    try:
+        full, reduced = (
+            manoeuvre.simulate(make_forward_dynamics(one, standard))
+            for one, standard in zip(compiled.values(), values, strict=True)
+        )
+    except DataError as error:
+        text = f"the selected model cannot be simulated in the first manoeuvre of the {name} set: {error}"
+        warnings.warn(text, ParamreduceWarning, stacklevel=2)
+        return None
+    free = manoeuvre.inputs.free
+    names = model.mechanism.coordinate_names
+    motions = (
+        {"position": motion.z[:, free], "acceleration": motion.ddz[:, free]}
+        for motion in (full, reduced)
+    )
+    return SimulatedManoeuvre(name, tuple(names[k] for k in free), manoeuvre.time, *motions)
 
 
 def _export_selected(

@@ -2,7 +2,6 @@
 
 import itertools
 import warnings
-import zlib
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from functools import cache, lru_cache, partial
@@ -10,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from paramreduce_cli.config.schema import SamplingSection, SimulationSection
+from paramreduce_cli.config.schema import SamplingSection
 from paramreduce_cli.errors import ConfigError, DataError, ParamreduceWarning
 from paramreduce_cli.excitation.fourier import (
     FINER,
@@ -19,15 +18,9 @@ from paramreduce_cli.excitation.fourier import (
     sample_times,
     shift_start,
 )
+from paramreduce_cli.excitation.manoeuvres import sample_manoeuvres
 from paramreduce_cli.excitation.point_to_point import evaluate_along
-from paramreduce_cli.excitation.simulated_inputs import make_inputs
-from paramreduce_cli.excitation.simulation import (
-    MassAndBias,
-    SimulatedMotion,
-    TextbookMassAndBias,
-    find_equilibrium,
-    simulate,
-)
+from paramreduce_cli.excitation.simulation import MassAndBias
 from paramreduce_cli.excitation.symmetry import complete_series, generate_group
 from paramreduce_cli.fields.section import expand_per_joint
 from paramreduce_cli.identification.measured_samples import LoggedSet
@@ -53,7 +46,6 @@ from paramreduce_cli.records import (
     Items,
     MeasuredLog,
     Model,
-    Progress,
     ProgressCallback,
     Recording,
     Recordings,
@@ -98,7 +90,7 @@ def sample(
             ("sampling", "log"),
         )
     dynamics = Dynamics(model.mechanism)
-    direct = cache(partial(_choose_forward_dynamics, model, dynamics))
+    direct = cache(partial(_compile_forward_dynamics, model))
 
     def make_set(name: str, points: int | None) -> ComputedSet:
         """Return a set from the log, the simulation, a recording or the trajectories; None if there is none."""
@@ -106,7 +98,7 @@ def sample(
         if sampling.log is not None:
             return _sample_log(model, dynamics, log, name)
         if sampling.simulation is not None:
-            return _sample_simulation(
+            return sample_manoeuvres(
                 sampling.simulation, model, dynamics, direct(), signals, name, report_progress
             )
         if recording is not None:
@@ -304,77 +296,16 @@ def _sample_log(model: Model, dynamics: Dynamics, log: MeasuredLog | None, name:
     return found
 
 
-def _sample_simulation(
-    section: SimulationSection,
-    model: Model,
-    dynamics: Dynamics,
-    direct: MassAndBias,
-    signals: SignalTables | None,
-    name: str,
-    report_progress: ProgressCallback,
-) -> ObservedSet:
-    """Return the samples of simulated motions of the full model under the config's inputs.
-
-    Raises:
-        ConfigError: The simulation fails; the message says at what time.
-    """
-    mechanism = model.mechanism
-    rng = np.random.default_rng([0, zlib.crc32(name.encode())])
-    time = np.arange(0.0, section.duration, section.step)
-    names, tables = mechanism.coordinate_names, signals or SignalTables({})
-    z, speed = np.zeros(mechanism.n_dof), np.zeros(mechanism.n_dof)
-    for coordinate, value in section.speed.items():
-        speed[names.index(coordinate)] = value
-    if mechanism.loops is not None:
-        z = mechanism.loops.assembly[list(mechanism.independent)]
-    motions: list[SimulatedMotion] = []
-    counts = (section.runs, section.validation_runs, section.test_runs)
-    runs = dict(zip(SETS, counts, strict=True))[name]
-    for done in range(runs):
-        start = z.copy()
-        for coordinate, (lower, upper) in section.start.items():
-            start[names.index(coordinate)] = rng.uniform(lower, upper)
-        try:
-            inputs = make_inputs(section, names, tables, rng)
-            if section.equilibrium:
-                start = find_equilibrium(direct, inputs, start)
-            motions.append(simulate(direct, inputs, start, speed, time))
-        except DataError as error:
-            raise ConfigError(f"{name} set: {error}", ("sampling", "simulation")) from error
-        report_progress(Progress(f"simulate motions of the {name} set", done + 1, runs))
-    return ObservedSet(
-        make_spans([time.size] * len(motions)),
-        _read_motion_states(motions),
-        dynamics,
-        model.values,
-        f"{name} set",
-    )
-
-
-def _choose_forward_dynamics(model: Model, dynamics: Dynamics) -> MassAndBias:
-    """Return the mass matrix and bias of the full model: compiled code, or the regressor without a compiler."""
+def _compile_forward_dynamics(model: Model) -> MassAndBias:
+    """Return the mass matrix and bias of the full model."""
     # Late, as few configs simulate: exports load templates, and more.
     from paramreduce_cli.export.code_generation import Exported
-    from paramreduce_cli.export.running import CompiledForwardDynamics, compile_model
+    from paramreduce_cli.export.running import compile_model, make_forward_dynamics
 
     known = model.formulations
-    plain = replace(model, formulations=Formulations(known.inverse[:1], known.direct[:1]))
-    compiled = compile_model(plain, make_full_model(model), Exported.DDM)
-    if compiled.library is None:
-        return TextbookMassAndBias(dynamics, model.values)
-    return CompiledForwardDynamics(compiled)
-
-
-def _read_motion_states(motions: list[SimulatedMotion]) -> StatesAt:
-    """Return a function that gives the states of simulated motions."""
-
-    def read_span(span: Span) -> StateBlock:
-        """Return the states of a span of the motions."""
-        motion, part = motions[span.trajectory], slice(span.start, span.stop)
-        states = motion.time[part], motion.z[part], motion.dz[part], motion.ddz[part]
-        return StateBlock(span.trajectory, *states, motion.tau[part])
-
-    return read_span
+    first = replace(model, formulations=Formulations(known.inverse[:1], known.direct[:1]))
+    compiled = compile_model(first, make_full_model(model), Exported.DDM)
+    return make_forward_dynamics(compiled, model.values)
 
 
 def _compute_measured_torques(model: Model, source: str, tau: FloatArray) -> FloatArray:
