@@ -30,6 +30,8 @@ class Cause(Enum):
     """Position limits within which the loops cannot be closed everywhere."""
     FULL_RANGE = auto()
     """Demand that every motion reaches its limits, which loops do not allow."""
+    STATIC = auto()
+    """Springs whose preload is to balance all other forces."""
     BOUNDS = auto()
     """Bounds on quantities that no position keeps."""
     BOUNDED_MOTION = auto()

@@ -11,6 +11,7 @@ from paramreduce_cli.config.plausibility import (
     find_implausible_speeds,
 )
 from paramreduce_cli.config.schema import Config
+from paramreduce_cli.config.use_groups import group_uses
 from paramreduce_cli.errors import Key
 from paramreduce_cli.fields.names import Problem, UnknownNameError
 from paramreduce_cli.fields.numbers import RATHER_DEGREES
@@ -172,6 +173,11 @@ def _list_parameters(config: Config) -> list[str]:
 
 def _check_groups(config: Config) -> Iterator[Problem]:
     """Yield problems of groups of parameters."""
+    if config.reduction.groups == "auto":
+        if not group_uses(config):
+            text = "is auto, but no subsystem is used twice. Give groups, or leave it out."
+            yield ("reduction", "groups"), text
+        return
     known = _list_parameters(config)
     owner: dict[str, str] = {}
     for k, entry in enumerate(config.reduction.groups):

@@ -21,6 +21,7 @@ _KEYS: dict[Cause, tuple[Key, str]] = {
         "If trajectories.use_full_range is true every motion reaches the limits: narrow them, or set "
         "it to false.",
     ),
+    Cause.STATIC: (("forces",), ""),
     Cause.BOUNDS: (_CONSTRAINTS, ""),
     Cause.BOUNDED_MOTION: (
         _CONSTRAINTS,

@@ -1,5 +1,7 @@
 """Keys that configs had before, and what stands in their place."""
 
+from typing import Any
+
 from paramreduce_cli.errors import Key
 
 _LEAVE_OUT = "is no longer a key; leave it out"
@@ -21,3 +23,11 @@ FORMER_KEYS: dict[Key, str] = {
     ("terms", "seed"): _LEAVE_OUT,
 }
 """Messages by key."""
+
+_BETWEEN = "a drive acts along coordinates. Write a spring or damper between two bodies under forces, with type: line, bodies and at"
+KEYS_ELSEWHERE: dict[tuple[Any, Any], str] = {
+    ("drives", "bodies"): _BETWEEN,
+    ("drives", "at"): _BETWEEN,
+    ("drives", "type"): _BETWEEN,
+}
+"""Advice for keys that belong elsewhere, by the first and the last step of the path."""

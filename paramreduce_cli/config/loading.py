@@ -16,11 +16,12 @@ from pydantic import BaseModel, ValidationError
 from paramreduce_cli.config import yaml_reading
 from paramreduce_cli.config.checks import find_problems, find_warnings
 from paramreduce_cli.config.coordinate_lists import cut_to_independent
-from paramreduce_cli.config.former_keys import FORMER_KEYS
+from paramreduce_cli.config.former_keys import FORMER_KEYS, KEYS_ELSEWHERE
 from paramreduce_cli.config.named_points import resolve_points
 from paramreduce_cli.config.schema import Config, Settings
 from paramreduce_cli.config.sections import find_keys
 from paramreduce_cli.config.subsystems import expand_subsystems
+from paramreduce_cli.config.use_groups import group_uses
 from paramreduce_cli.config.yaml_reading import Document
 from paramreduce_cli.errors import ConfigError, Key, ParamreduceWarning, prepend_key
 from paramreduce_cli.fields.names import Problem, UnknownNameError
@@ -76,7 +77,7 @@ def load_config(path: Path, overrides: Sequence[str] = ()) -> Config:
         )  # fmt: skip
     for text in find_warnings(config):
         warnings.warn(text, ParamreduceWarning, stacklevel=2)
-    return _resolve_paths(_drop_unused_tests(_choose_use(config)), path.parent)
+    return _resolve_paths(_drop_unused_tests(_list_groups(_choose_use(config))), path.parent)
 
 
 def load_settings(path: Path | None, overrides: Sequence[str] = ()) -> Settings:
@@ -326,15 +327,17 @@ def _remove_key(data: Any, path: Key) -> None:
 def _describe_entry(entry: Any, data: Any, kind: type[Section] = Config) -> Problem:
     """Return the key and the message of one of pydantic's errors."""
     path = _strip_union_steps(entry["loc"], data, kind)
-    owner, key = _find_section(path[:-1], kind), path[-1] if path else ""
+    owner, key = _find_section(path[:-1], kind, data), path[-1] if path else ""
     if entry["type"] == "extra_forbidden" and owner is not None:
-        former = FORMER_KEYS.get(path)
-        return path, former or UnknownNameError("key", str(key), owner.model_fields)
+        told = FORMER_KEYS.get(path) or KEYS_ELSEWHERE.get((path[0], key))
+        return path, told or UnknownNameError("key", str(key), owner.model_fields)
+    if entry["type"].startswith("union_tag"):
+        return _describe_tag(entry, path)
     meaning = ""
     if owner is not None and isinstance(key, str) and key in owner.model_fields:
         meaning = owner.model_fields[key].description or ""
     if entry["type"] == "missing":
-        return path, f"is missing. It says: {meaning}"
+        return path, f"is missing. It says: {meaning}" if meaning else "is missing"
     cause = entry.get("ctx", {}).get("error")
     if isinstance(cause, UnknownNameError):
         return path, cause
@@ -349,14 +352,25 @@ def _describe_entry(entry: Any, data: Any, kind: type[Section] = Config) -> Prob
     return path, f"{message.rstrip('.')}." + (f" It says: {meaning}" if meaning else "")
 
 
+def _describe_tag(entry: Any, path: Key) -> Problem:
+    """Return the key and the message where a section does not say of which type it is, or says an unknown one."""
+    context = entry["ctx"]
+    key = context["discriminator"].strip("'")
+    if entry["type"] == "union_tag_not_found":
+        return (*path, key), "is missing"
+    types = [tag.strip(" '") for tag in context["expected_tags"].split(",")]
+    return (*path, key), UnknownNameError(key, context["tag"], types)
+
+
 def _strip_union_steps(location: Iterable[str | int], data: Any, kind: type[Section]) -> Key:
     """Return pydantic's location without the steps that name a member of a union."""
     path: list[str | int] = []
-    steps = list(location)
+    steps, whole = list(location), data
     for k, step in enumerate(steps):
         last = k == len(steps) - 1
         if isinstance(data, dict) and (step in data or (last and isinstance(step, str))):
-            if step not in data and _find_section(tuple(path), kind) is None:
+            is_member = data.get("type") == step or _find_section(tuple(path), kind, whole) is None
+            if step not in data and is_member:
                 continue
             path.append(step)
             data = data.get(str(step))
@@ -366,17 +380,25 @@ def _strip_union_steps(location: Iterable[str | int], data: Any, kind: type[Sect
     return tuple(path)
 
 
-def _find_section(path: Key, kind: type[Section]) -> type[BaseModel] | None:
-    """Return the section of a schema that a path leads to, or None."""
+def _find_section(path: Key, kind: type[Section], data: Any) -> type[BaseModel] | None:
+    """Return the section of a schema that a path leads to, or None.
+
+    Args:
+        path: Keys of the path.
+        kind: Section that the path begins in.
+        data: Data of this section; where sections have types, the data say which one is meant.
+    """
     annotation: Any = kind
     for step in path:
         if isinstance(annotation, type) and issubclass(annotation, BaseModel):
             field = annotation.model_fields.get(str(step))
             if field is None:
                 return None
-            annotation = _unwrap(field.annotation)
+            data = data.get(step) if isinstance(data, dict) else None
+            annotation = _unwrap(field.annotation, data)
         elif get_origin(annotation) in (list, dict):
-            annotation = _unwrap(get_args(annotation)[-1])
+            data = _get_item(data, step)
+            annotation = _unwrap(get_args(annotation)[-1], data)
         else:
             return None
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
@@ -384,15 +406,31 @@ def _find_section(path: Key, kind: type[Section]) -> type[BaseModel] | None:
     return None
 
 
-def _unwrap(annotation: Any) -> Any:
-    """Return the part of an optional or annotated type that can hold keys."""
+def _get_item(data: Any, step: str | int) -> Any:
+    """Return an item of a mapping or a list, None if there is no such item."""
+    try:
+        return data[step]
+    except (KeyError, IndexError, TypeError):
+        return None
+
+
+def _unwrap(annotation: Any, data: Any) -> Any:
+    """Return the part of an optional or annotated type that can hold keys; of sections with types that of the data."""
     if hasattr(annotation, "__metadata__"):
-        return _unwrap(annotation.__origin__)
+        return _unwrap(annotation.__origin__, data)
     if get_origin(annotation) in (Union, UnionType):
-        members = [_unwrap(a) for a in get_args(annotation) if a is not type(None)]
+        members = [_unwrap(a, data) for a in get_args(annotation) if a is not type(None)]
         sections = [a for a in members if isinstance(a, type) and issubclass(a, BaseModel)]
-        return (sections or members or [annotation])[0]
+        meant = [a for a in sections if _has_type(a, data)]
+        return (meant or sections or members or [annotation])[0]
     return annotation
+
+
+def _has_type(section: type[BaseModel], data: Any) -> bool:
+    """Return whether a section is of the type that data say."""
+    field = section.model_fields.get("type")
+    named = data.get("type") if isinstance(data, dict) else None
+    return field is not None and named in get_args(field.annotation)
 
 
 def _format_problem(document: Document, problem: Problem) -> str:
@@ -409,6 +447,14 @@ def _choose_use(config: Config) -> Config:
         return config
     use = "feed-forward" if config.sampling.simulation is None else "simulation"
     return config.model_copy(update={"selected": config.selected.model_copy(update={"use": use})})
+
+
+def _list_groups(config: Config) -> Config:
+    """Return the config with the groups of the uses of subsystems, where it asks for them."""
+    if config.reduction.groups != "auto":
+        return config
+    reduction = config.reduction.model_copy(update={"groups": group_uses(config)})
+    return config.model_copy(update={"reduction": reduction})
 
 
 def _drop_unused_tests(config: Config) -> Config:

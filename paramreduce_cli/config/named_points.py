@@ -104,6 +104,9 @@ class _Resolver:
             if "at" in payload:
                 place: Key = ("payloads", name, "at")
                 payload["at"] = self._resolve_placement(payload["at"], frame, place)
+            if isinstance(payload.get("com"), str):
+                frame = frame @ self._compose(payload.get("at", []))
+                payload["com"] = self._locate(payload["com"], frame, ("payloads", name, "com"))
         for chosen, bodies in _iterate_dicts(data.get("parameter_sets")):
             for name, body in _iterate_dicts(bodies):
                 if isinstance(body.get("com"), str):
@@ -130,7 +133,7 @@ class _Resolver:
         """Return a placement with its named points as shifts, in a frame whose place in the base is given."""
         if isinstance(at, str) and not self._is_number(at):
             return self._locate(at, frame, path)
-        if not isinstance(at, list) or not any(isinstance(step, dict) for step in at):
+        if not isinstance(at, list) or not any(self._is_step(step) for step in at):
             return at
         steps = []
         for step in at:
@@ -138,6 +141,11 @@ class _Resolver:
             frame = frame @ self._compose([new])
             steps.append(new)
         return steps
+
+    def _is_step(self, step: Any) -> bool:
+        """Return whether a part of a placement is a step or a named point, and not a component of a vector."""
+        named = isinstance(step, str) and step in self._points and not self._is_number(step)
+        return isinstance(step, dict) or named
 
     def _resolve_axes(self, axes: Any, frame: FloatArray, path: Key) -> Any:
         """Return the axes of a joint with directions to points as vectors."""

@@ -176,6 +176,10 @@ class MotionSection(Section):
             raise ValueError("amplitude and frequencies belong together; one of them does nothing")
         if self.frequencies and self.file is not None:
             raise ValueError("give frequencies or a file, not both")
+        if not self.model_fields_set:
+            raise ValueError(
+                "is empty; give amplitude and frequencies, or a file, or amplitude: 0 to hold it"
+            )
         return self
 
 
@@ -378,8 +382,8 @@ class ReductionSection(Section):
     """Selection by the cost of evaluating the model."""
     weighting: Literal["nominal-torque", "noise", "none"] = "nominal-torque"
     """What each joint's torques are divided by in fitting and scoring alike: nominal torques, the noise that a fit of all parameters leaves (for measured torques), or nothing."""
-    groups: list[GroupSection] = []
-    """Parameters that are selected or dropped together."""
+    groups: list[GroupSection] | Literal["auto"] = []
+    """Parameters that are selected or dropped together; auto groups those of the same role in all uses of a subsystem."""
     stop: Stop = Stop()
     """When to stop."""
 

@@ -51,14 +51,14 @@ def expand_subsystems(document: Document) -> list[Problem]:
         return []
     problems: list[Problem] = []
     for k, use in enumerate(uses):
-        if not isinstance(use, dict):
+        if not isinstance(use, dict) or "subsystem" not in use:
             continue
-        name, place = str(use.get("subsystem")), ("uses", k)
+        name, place = str(use["subsystem"]), ("uses", k)
         if name not in subsystems:
             error = UnknownNameError("subsystem", name, list(subsystems))
             problems.append(((*place, "subsystem"), error))
         elif isinstance(subsystems[name], dict):
-            copied = _Copy(subsystems[name], str(use.get("suffix", "")), use.get("mirror"))
+            copied = _Copy(subsystems[name], use)
             # Where one name clashes, so do all.
             problems += _merge(document, ("subsystems", name), copied.write(), place)[:1]
     return problems
@@ -139,16 +139,18 @@ def _copy_lines(document: Document, source: Key, target: Key) -> None:
 
 
 class _Copy:
-    """A copy of a subsystem with other names, perhaps mirrored.
+    """A copy of a subsystem with other names, perhaps moved and mirrored.
 
     Args:
         subsystem: Subsystem as it is written.
-        suffix: Text that is added to the names of the subsystem.
-        mirror: Axis of the base whose direction is reversed: x, y, z or None.
+        use: Suffix of the names, names for bodies and coordinates outside, shift of the points, and mirrored axis.
     """
 
-    def __init__(self, subsystem: Mapping[str, Any], suffix: str, mirror: Any) -> None:
-        self._subsystem, self._suffix = subsystem, suffix
+    def __init__(self, subsystem: Mapping[str, Any], use: Mapping[str, Any]) -> None:
+        self._subsystem, self._suffix = subsystem, str(use.get("suffix", ""))
+        outside, shift, mirror = use.get("names"), use.get("shift"), use.get("mirror")
+        self._outside: dict[Any, Any] = outside if isinstance(outside, dict) else {}
+        self._shift = shift if isinstance(shift, list) and len(shift) == 3 else None
         self._flipped = "xyz".find(mirror) if isinstance(mirror, str) and mirror else -1
         self._defaults: dict[str, str] = {}
         """New default names of the coordinates of joints of several axes."""
@@ -163,7 +165,7 @@ class _Copy:
             "independent": [self._rename(name) for name in _wrap_in_list(parts.get("independent"))],
         }
         writers: dict[str, Callable[[Any], Any]] = {
-            "points": self._mirror_vector,
+            "points": self._write_point,
             "guess": lambda value: value,
             "drives": self._write_element,
             "forces": self._write_element,
@@ -191,10 +193,12 @@ class _Copy:
         return own
 
     def _rename(self, name: Any) -> Any:
-        """Return a name with the suffix if it is one of the subsystem."""
+        """Return a name with the suffix if it is one of the subsystem, and the name in this use if it is none."""
         if str(name) in self._defaults:
             return self._defaults[str(name)]
-        return f"{name}{self._suffix}" if str(name) in self._own else name
+        if str(name) in self._own:
+            return f"{name}{self._suffix}"
+        return self._outside.get(name, name)
 
     def _write_body(self, body: dict[str, Any]) -> dict[str, Any]:
         """Return a body of the copy."""
@@ -279,6 +283,12 @@ class _Copy:
         change = not slides if to else ("xyz".find(name) == self._flipped) == slides
         sign = ("" if sign else "-") if change else sign
         return f"{sign}to {self._rename(name)}" if to else f"{sign}{name}"
+
+    def _write_point(self, point: Any) -> Any:
+        """Return a named point, shifted and then mirrored."""
+        if self._shift is not None and isinstance(point, list) and len(point) == 3:
+            point = [f"({x}) + ({by})" for x, by in zip(point, self._shift, strict=True)]
+        return self._mirror_vector(point)
 
     def _write_parameters(self, body: Any) -> Any:
         """Return the parameters of a body of the copy."""

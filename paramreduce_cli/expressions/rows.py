@@ -85,13 +85,17 @@ def make_rows(
     def zeros(*shape: int) -> IntArray:
         return np.zeros(shape, dtype=np.int64)
 
+    def small_zeros(*shape: int) -> IntArray:
+        # The largest arrays hold numbers of slots, which fit into 32 bits.
+        return np.zeros(shape, dtype=np.int32)
+
     rows = Rows(
         numbers=zeros(size, WAITS + lists),
-        terms=zeros(size, width),
-        links=zeros(size * width, 6),
+        terms=small_zeros(size, width),
+        links=small_zeros(size * width, 6),
         waiting=zeros(lists, size),
         saved=zeros(size, 3),
-        saved_terms=zeros(size, width),
+        saved_terms=small_zeros(size, width),
         counters=zeros(WAITING + lists),
         room=zeros(4, 2 * (size + width)),
         pairs=zeros(width, width),

@@ -12,7 +12,7 @@ from paramreduce_cli.records import Block, BoolArray, FloatArray
 Direct = Callable[[FloatArray, FloatArray, FloatArray], tuple[FloatArray, FloatArray]]
 """Generalised coordinates, velocities and the parameters of models to their M and delta."""
 
-_VALUES_AT_ONCE = 4_000_000
+_VALUES_AT_ONCE = 1_000_000
 """Mass-matrix elements held in memory at a time."""
 
 

@@ -12,6 +12,7 @@ import numpy as np
 from paramreduce_cli.expressions.factoring import Values, minimise_operations
 from paramreduce_cli.expressions.graph import ZERO, Graph
 from paramreduce_cli.expressions.programs import Program
+from paramreduce_cli.lean.algebra import forget
 from paramreduce_cli.lean.joint_formulations import from_data
 from paramreduce_cli.lean.joint_frames import choose_frames
 from paramreduce_cli.lean.lean_outputs import Build, build_direct_outputs, build_inverse_outputs
@@ -130,6 +131,7 @@ class LeanModels:
             if self._projected:
                 outputs = project(self.mechanism, graph, outputs)
             programs.append(Program.from_graph(*Values(graph, outputs).simplify()))
+            forget()  # what is remembered is of this graph, and large
         return _Variants(programs)
 
     def build_inverse(

@@ -165,7 +165,7 @@ class Drive:
     smoothing: float = 0.0
     """Speed s at which Coulomb friction, tanh(speed / s), is 76 %; zero for the sign of the speed."""
     rest: float = 0.0
-    """Position where the spring is slack, rad or m."""
+    """Position where the spring is slack, rad or m; NaN until a static equilibrium decides."""
     stribeck_velocity: float = 0.1
     """Speed s beyond which the Stribeck friction, which has the factor sign(speed) - tanh(speed / s), fades."""
     spring_table: FloatArray | None = None

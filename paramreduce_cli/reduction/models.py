@@ -17,6 +17,8 @@ from paramreduce_cli.records import (
 
 _STIFF = 1e-6
 """Size of a large change of a drive's parameter: much less than that of a body's."""
+_MOSTLY = 0.5
+"""Fraction of a lumped value from which on a parameter makes up most of it."""
 
 
 def list_choices(reduction: Reduction) -> list[str]:
@@ -101,3 +103,29 @@ def make_reduced_model(
     kept, beta = found.subsets[row][order], found.beta[row][order]
     expressions = approximate_expressions(columns.names, kept, beta, whole)
     return replace(reduction.make_model(heuristic, row), expressions=tuple(expressions))
+
+
+def find_carriers(
+    reduction: Reduction, heuristic: str, row: int, known_values: FloatArray
+) -> dict[str, str]:
+    """Return the parameters that make up most of a lumped value of another name, by the name of the value.
+
+    In a subset of few parameters, the inertia of a lever may stand for that of the chassis that carries the lever.
+
+    Args:
+        reduction: Reduction that holds the subset.
+        heuristic: Heuristic that found the subset.
+        row: Row of the subset.
+        known_values: Standard parameters, (n_standard,).
+    """
+    found, columns = reduction.heuristics[heuristic], reduction.columns
+    values = np.linalg.pinv(columns.expansion) @ known_values
+    kept = found.subsets[row]
+    others = np.setdiff1d(np.arange(len(columns.names)), kept)
+    carriers = {}
+    for k, own in zip(kept.tolist(), found.beta[row], strict=True):
+        parts = np.abs(own * values[others])
+        largest = int(parts.argmax()) if parts.size else 0
+        if parts.size and parts[largest] > _MOSTLY * (parts.sum() + abs(values[k])):
+            carriers[columns.names[k]] = columns.names[int(others[largest])]
+    return carriers

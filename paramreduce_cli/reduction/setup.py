@@ -5,7 +5,7 @@ import warnings
 import numpy as np
 
 from paramreduce_cli.config.schema import ReductionSection
-from paramreduce_cli.errors import DataError, ParamreduceWarning
+from paramreduce_cli.errors import ConfigError, DataError, ParamreduceWarning
 from paramreduce_cli.multibody.base_parameters import find_affecting_columns
 from paramreduce_cli.records import BoolArray, FloatArray, Model, Run, Samples
 from paramreduce_cli.reduction.grouping import Group, GroupedColumns, group_columns
@@ -14,7 +14,16 @@ from paramreduce_cli.reduction.task import Effort
 
 
 def make_columns(section: ReductionSection, samples: Samples) -> GroupedColumns:
-    """Return the columns that the selection chooses among."""
+    """Return the columns that the selection chooses among.
+
+    Raises:
+        ConfigError: The groups are those of subsystems, and there is no robot.
+    """
+    if section.groups == "auto":
+        raise ConfigError(
+            "is auto, which groups the uses of subsystems, and samples without a robot have none. Give groups, or leave it out.",
+            ("reduction", "groups"),
+        )
     groups = [
         Group(name, tuple(members), entry.tied)
         for entry in section.groups

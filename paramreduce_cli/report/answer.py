@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from paramreduce_cli.records import About, ErrorRange, ReducedModel, Speed, Validation
+from paramreduce_cli.reduction.models import find_carriers
 from paramreduce_cli.report.data import NO_TORQUE, ReportData
 from paramreduce_cli.texts import format_percent
 from paramreduce_cli.texts.measured_values import format_measured
@@ -27,6 +28,8 @@ class ShownParameter:
     """Standard deviation where torques were measured; empty elsewhere."""
     relation: str
     """Sum of standard parameters that the value is of; empty for a parameter alone."""
+    carrier: str
+    """Other parameter that makes up most of the value; empty if there is none."""
 
 
 @dataclass(frozen=True)
@@ -125,6 +128,7 @@ def _list_parameters(data: ReportData, model: ReducedModel) -> tuple[ShownParame
     """Return the parameters of the selected model as the page shows them."""
     found = None if data.identification is None else data.identification.reduced
     deviations = {} if found is None else found.find_deviations(model)
+    carriers = _find_carriers(data)
     expressions = model.expressions or model.names
     return tuple(
         ShownParameter(
@@ -133,11 +137,23 @@ def _list_parameters(data: ReportData, model: ReducedModel) -> tuple[ShownParame
             data.find_unit(parameter).replace("^2", "²"),
             format_measured(value, deviations.get(name))[1],
             relation if relation != name else "",
+            carriers.get(name, ""),
         )
         for parameter, name, value, relation in zip(
             model.first, model.names, model.values, expressions, strict=True
         )
     )
+
+
+def _find_carriers(data: ReportData) -> dict[str, str]:
+    """Return the parameters that make up most of a selected value of another name; none without a robot."""
+    if data.model is None:
+        return {}
+    selected, reduction = data.validation.selected, data.reduction
+    row = reduction.heuristics[selected.heuristic].find_row(selected.n)
+    if row is None:
+        return {}
+    return find_carriers(reduction, selected.heuristic, row, data.model.values)
 
 
 _KINDS = {

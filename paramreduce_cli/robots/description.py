@@ -97,6 +97,10 @@ class UseSection(Section):
     """Name of the subsystem."""
     suffix: Annotated[str, Field(pattern=r"^[A-Za-z0-9_.-]*$")] = ""
     """Text that is added to the names of all bodies, coordinates, points, closures, drives and forces of the subsystem."""
+    shift: Annotated[list[Number], Field(min_length=3, max_length=3)] | None = None
+    """Vector that the subsystem's named points are moved by, before they are mirrored, m."""
+    names: dict[Name, Name] = {}
+    """Names of this use for bodies and coordinates outside the subsystem, such as {frame: frame_2}."""
     mirror: Literal["x", "y", "z"] | None = None
     """Axis of the base whose direction is reversed in this use: y makes the right side of a vehicle of the left."""
 

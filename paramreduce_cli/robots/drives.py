@@ -49,8 +49,8 @@ class ForceParameters(Section):
     """Constant torque or force, N m (N)."""
     stiffness: Value | None = None
     """Stiffness of a spring, N m/rad (N/m)."""
-    rest: Number = 0.0
-    """Position where the spring is slack, rad (m)."""
+    rest: Number | Literal["static"] = 0.0
+    """Position where the spring is slack, rad (m); static for the one with which springs balance all other forces in the design position."""
     stribeck: Value | None = None
     """Additional friction at low speed, N m (N); it fades beyond stribeck_velocity."""
     asymmetry: Value | None = None
@@ -72,6 +72,16 @@ class ForceParameters(Section):
         if not self.get_values() and not {"smoothing", "stribeck_velocity"} & self.model_fields_set:
             raise ValueError(
                 f"is empty; give one of {', '.join(k.key for k in self._list_kinds())}"
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _check_static(self) -> Self:
+        """Raise ValueError if a rest position is to be found, and there is no stiffness to find it with."""
+        known = isinstance(self.stiffness, float | int) and self.stiffness > 0
+        if self.rest == "static" and (not known or self.spring_table is not None):
+            raise ValueError(
+                "rest: static needs a stiffness that is known and positive, and no spring_table"
             )
         return self
 
@@ -103,7 +113,7 @@ class ForceParameters(Section):
         arrays = {key: None if value is None else np.array(value) for key, value in tables.items()}
         return {
             "smoothing": self.smoothing,
-            "rest": self.rest,
+            "rest": np.nan if self.rest == "static" else self.rest,
             "stribeck_velocity": self.stribeck_velocity,
             **arrays,
         }

@@ -19,6 +19,7 @@ from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.multibody.loops.assembly import assemble, find_assembly_modes
 from paramreduce_cli.multibody.random_states import draw_states
 from paramreduce_cli.multibody.relations import format_regrouping
+from paramreduce_cli.multibody.static_rests import set_static_rests
 from paramreduce_cli.records import (
     BaseParameters,
     BoolArray,
@@ -63,7 +64,7 @@ def build_model(
             raise DataError("there is no log.h5, which decides on friction.", command="process-log")
         if log.friction is not None:
             robot = robot.apply_friction(log.friction)
-    mechanism = assemble(robot.build_mechanism())
+    mechanism = set_static_rests(assemble(robot.build_mechanism()), robot.get_values())
     rng = np.random.default_rng(_SEED)
     states = draw_states(mechanism, _STATES, rng)
     _check_lengths(mechanism, states[0])
@@ -179,7 +180,8 @@ def _format_expressions(
     """
     betas, geometries = [base.beta], [mechanism]
     for _ in range(_CHANGED_GEOMETRIES if mechanism.lengths else 0):
-        changed = robot.stretch(lambda length: length * rng.uniform(0.8, 1.25)).build_mechanism()
+        stretched = robot.stretch(lambda length: length * rng.uniform(0.8, 1.25))
+        changed = set_static_rests(stretched.build_mechanism(), stretched.get_values())
         K = Dynamics(changed, once=True).compute_regressor(*states)[:, robot.find_measured()]
         betas.append(compute_regrouping(K.reshape(-1, K.shape[2]), base.columns, affects))
         geometries.append(changed)

@@ -10,6 +10,7 @@ from paramreduce_cli.identification.processing import process_logs
 from paramreduce_cli.identification.quality import find_base
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.multibody.loops.assembly import assemble
+from paramreduce_cli.multibody.static_rests import set_static_rests
 from paramreduce_cli.records import MeasuredLog, ProgressCallback, RawLogs
 from paramreduce_cli.robots import Robot
 
@@ -38,7 +39,8 @@ def process_log(
     """
     if log is None:
         raise make_no_log_error()
-    dynamics = Dynamics(assemble(robot.build_mechanism()), once=True)
+    mechanism = set_static_rests(assemble(robot.build_mechanism()), robot.get_values())
+    dynamics = Dynamics(mechanism, once=True)
     found = process_logs_of_robot(dynamics, robot, log, logs, report_progress)
     for text in found.warnings:
         warnings.warn(f"log: {text.rstrip('.')}", ParamreduceWarning, stacklevel=2)

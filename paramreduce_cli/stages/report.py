@@ -70,11 +70,15 @@ from paramreduce_cli.report.skeleton import (
 from paramreduce_cli.report.summary import gather_summary
 from paramreduce_cli.report.tables import tables
 from paramreduce_cli.report.tracking.demonstration import simulate_tracking
+from paramreduce_cli.resources.memory import release_memory
+from paramreduce_cli.texts import format_percent
 from paramreduce_cli.texts.latex_table import format_latex_table
 
 _POSES = 3
 _MOTIONS, _FRAMES = 40, 1200
 """Motions of each set that are animated at most, and poses of all of them together."""
+_STRAYED = 0.05
+"""Deviation of the positions in a simulated manoeuvre that a warning is given from."""
 _ANIMATED = 100_000
 """Samples of a set from which on its first motion alone is animated: finding the others would take long."""
 
@@ -143,6 +147,7 @@ def report(
         run.progress(Progress("figures, tables and page", done, len(drawn) + 1, name))
 
     report_progress(0)
+    release_memory()
     encoded = render_figures(
         drawn, data, sorted({*formats, "svg"}), jobs=run.jobs, on_figure=report_progress
     )
@@ -258,7 +263,22 @@ def _simulate_manoeuvre(
         {"position": motion.z[:, free], "acceleration": motion.ddz[:, free]}
         for motion in (full, reduced)
     )
-    return SimulatedManoeuvre(name, tuple(names[k] for k in free), manoeuvre.time, *motions)
+    result = SimulatedManoeuvre(name, tuple(names[k] for k in free), manoeuvre.time, *motions)
+    _warn_of_straying(result)
+    return result
+
+
+def _warn_of_straying(manoeuvre: SimulatedManoeuvre) -> None:
+    """Warn if the selected model strays far from the full one, as small errors add up over time."""
+    deviations = manoeuvre.compute_deviations("position")
+    if manoeuvre.compute_error("position") > _STRAYED:
+        worst = int(deviations.argmax())
+        text = (
+            f"in a simulated manoeuvre the positions of the selected model stray by {format_percent(manoeuvre.compute_error('position'))} "
+            f"from those of the full one, {manoeuvre.names[worst]} by {format_percent(float(deviations[worst]))}. Lower "
+            "selected.acceleration_error or selected.torque_error for a model that follows."
+        )
+        warnings.warn(text, ParamreduceWarning, stacklevel=3)
 
 
 def _export_selected(

@@ -184,3 +184,57 @@ def test_parts_of_another_form_are_said(tmp_path, old, new, says):
     with pytest.raises(ConfigError) as caught:
         load(tmp_path, MIRRORED.replace(old, new), axis="x")
     assert says in str(caught.value)
+
+
+def test_groups_are_those_of_the_same_role(tmp_path):
+    text = MIRRORED + "reduction: {{groups: auto}}\n"
+    text = text.replace(
+        "    forces:\n",
+        "    forces:\n      mount: {{type: bushing, bodies: [trunk, thigh], at: foot, stiffness: [1, 2, 3, 0, 0, 0]}}\n",
+    )
+    config = load(tmp_path, text, axis="x")
+    groups = {group.name: group.parameters for group in config.reduction.groups}
+    assert groups["Ixy_arm_thigh"] == ["Ixy_thigh_l", "Ixy_thigh_r"]
+    assert groups["k_arm_both"] == ["k_both_l", "k_both_r"]
+    assert groups["k_arm_mount_y"] == ["k_mount_l_y", "k_mount_r_y"]
+    grouped = {name for members in groups.values() for name in members}
+    left = set(config.build_mechanism().parameter_names) - grouped
+    assert all(name.endswith("_trunk") for name in left)
+
+
+def test_groups_of_uses_need_uses(tmp_path):
+    text = LOOP + "reduction: {{groups: auto}}\n"
+    with pytest.raises(ConfigError, match="no subsystem is used twice"):
+        load(tmp_path, text, kind="point", at="C", independent="q_crank")
+
+
+SHIFTED = MIRRORED.replace(
+    "  - {{subsystem: arm, suffix: _r, mirror: y}}\n",
+    "  - {{subsystem: arm, suffix: _r, shift: [1.5, 0.1, w], names: {{trunk: tail}}, mirror: y}}\n",
+).replace(
+    "coordinates: height}}]}}",
+    "coordinates: height}}, {{name: tail, parent: trunk, at: [0.5, 0, 0], axes: z}}]}}",
+)
+
+
+def test_a_use_may_be_elsewhere_on_another_body(tmp_path):
+    config = load(tmp_path, SHIFTED.replace("{{trunk: {{m: 10}}", "{{trunk: {{m: 10}}, tail: {{m: 1}}"), axis="x")  # fmt: skip
+    mechanism = config.build_mechanism()
+    names = [body.name for body in mechanism.bodies]
+    parents = {b.name: names[b.parent] if b.parent >= 0 else "base" for b in mechanism.bodies}
+    assert (parents["thigh_l"], parents["thigh_r"]) == ("trunk", "tail")
+    poses = compute_body_poses(mechanism, np.zeros(mechanism.n_q))
+    np.testing.assert_allclose(poses[names.index("thigh_r"), :3, 3], [1.6, -0.5, 0.6])
+    np.testing.assert_allclose(poses[names.index("eyed_r"), :3, 3], [1.7, -0.8, 0.8])
+    (spring,) = [d for d in mechanism.drives if d.name == "spring_r"]
+    assert names[spring.between.bodies[0]] == "tail"
+
+
+def test_a_shift_has_three_components(tmp_path):
+    with pytest.raises(ConfigError, match="at least 3 items"):
+        load(tmp_path, SHIFTED.replace("[1.5, 0.1, w]", "[1.5, 0.1]"), axis="x")
+
+
+def test_a_use_without_a_subsystem_is_said(tmp_path):
+    with pytest.raises(ConfigError, match=r"uses\.0\.subsystem"):
+        load(tmp_path, MIRRORED.replace("subsystem: arm, suffix: _l", "suffix: _l"), axis="x")

@@ -222,7 +222,17 @@ def test_dampers_take_the_power_of_the_square_of_their_speed(sprung, states, reg
         ("spin: spin", "spin: spun", "Did you mean spin?"),
         ("    spin: spin\n", "", "longitudinal needs spin"),
         ("  strut:\n", "  arm:\n", "'arm' is taken"),
-        ("type: bushing", "type: bush", "bushing"),
+        (
+            "type: bushing",
+            "type: bush",
+            "forces.mount.type: unknown type 'bush'. Did you mean bushing?",
+        ),
+        (
+            "    spin: spin\n",
+            "    spins: spin\n",
+            "forces.tyre.spins: unknown key 'spins'. Did you mean spin?",
+        ),
+        ("    radius: 0.3\n", "", "forces.light.radius is missing. It says: Radius without load"),
         ("[0.1, 0], [0.2, 800]", "[0.2, 0], [0.2, 800]", "must ascend"),
         ("positions: {rz: -1, y: 0.1}, speeds: {y: 0.05}, ", "", "has no creepage"),
     ],

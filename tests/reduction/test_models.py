@@ -13,6 +13,7 @@ from paramreduce_cli.records import (
     Subsets,
 )
 from paramreduce_cli.reduction.models import (
+    find_carriers,
     list_choices,
     make_base_model,
     make_full_model,
@@ -84,3 +85,11 @@ def test_full_and_base_models_are_the_same_dynamics():
     others = np.setdiff1d(np.arange(model.values.size), model.base.columns)
     expected = model.values[model.base.columns] + model.base.beta @ model.values[others]
     assert base.values == pytest.approx(expected)
+
+
+def test_a_value_says_whose_it_is_mostly():
+    reduction = grouped_reduction()
+    # both = 2 a - d and its own: parts of 2 * 4, 1 and 3.
+    assert find_carriers(reduction, "swap", 0, np.array([4.0, 3.0, 3.0, 1.0])) == {"both": "a"}
+    assert find_carriers(reduction, "swap", 0, np.array([4.0, 8.0, 8.0, 1.0])) == {}
+    assert find_carriers(reduction, "swap", 1, np.array([4.0, 3.0, 3.0, 1.0])) == {}

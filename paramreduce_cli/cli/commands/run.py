@@ -35,6 +35,7 @@ from paramreduce_cli.cli.terminal import (
 )
 from paramreduce_cli.config import load_config, locate_errors
 from paramreduce_cli.records import Report
+from paramreduce_cli.resources.memory import release_memory
 from paramreduce_cli.running.pipeline import find_missing_files, list_stages_to_run
 from paramreduce_cli.running.runner import Runner, format_arguments
 from paramreduce_cli.texts import format_percent, format_percent_range
@@ -97,6 +98,8 @@ def run(
                      seconds=outcome.seconds, path=str(outcome.path))  # fmt: skip
             elif not quiet:
                 say_outcome(outcome)
+            del outcome  # its record is large, and the next stage reads what it needs
+            release_memory()
     summary = load_summary(store.get_path(Report))
     if not quiet:
         _say_summary(summary)
