@@ -28,7 +28,7 @@ from paramreduce_cli.artifacts.atomic import (
 from paramreduce_cli.artifacts.checksums import CheckedRows, RowChecks, write_checks
 from paramreduce_cli.errors import ArtifactError
 
-SCHEMA = 21
+SCHEMA = 22
 """Version of the layout of all artifacts; raised whenever a name, shape or unit changes."""
 
 _CHUNK = 16384

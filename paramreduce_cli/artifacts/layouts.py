@@ -73,7 +73,7 @@ _ATTRIBUTES = {
 _TEXTS = {(Model, "mechanism"), (Model, "formulations"), (Trajectories, "constraints")}
 """Fields that are one JSON text."""
 _BY_SIZE = {
-    *((Subsets, name) for name in ("subsets", "parameters", "beta")),
+    *((Subsets, name) for name in ("subsets", "parameters")),
     *((Proofs, name) for name in ("subsets", "logs")),
 }
 """Arrays, one for each subset: datasets named by its size."""

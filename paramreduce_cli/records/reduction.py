@@ -170,8 +170,6 @@ class Subsets(BySize):
     """The same in the infinity norm, (m,)."""
     parameters: tuple[FloatArray, ...]
     """Approximate base parameters of each subset, in its order; (n,) each."""
-    beta: tuple[FloatArray, ...]
-    """W_E ~ W_R beta, the other columns in ascending order; (n, n_all - n) each."""
     minimum_norm: BoolArray
     """Mask of subsets beyond the rank, which are fitted with minimum norm, (m,)."""
     seconds: float

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from paramreduce_cli.multibody.orthogonal import DEPENDENT, select_independent
+from paramreduce_cli.multibody.orthogonal import DEPENDENT, normalise_columns, select_independent
 from paramreduce_cli.records import FloatArray, IntArray
 from paramreduce_cli.reduction.problem import SelectionProblem
 
@@ -15,28 +15,42 @@ class Fit:
 
     parameters: FloatArray
     """Approximate base parameters phi'_R, (n,)."""
-    beta: FloatArray
-    """W_E ~ W_R beta with the other columns in ascending order, (n, n_all - n)."""
     torque_error: float
     minimum_norm: bool
     """Whether the columns are dependent, so that the smallest of many solutions was taken."""
 
 
 def fit(problem: SelectionProblem, subset: IntArray) -> Fit:
-    """Fit a subset: phi'_R = W_R^+ chi and beta = W_R^+ W_E [Ros2019], Eqs. 17 and 20.
+    """Fit a subset: phi'_R = W_R^+ chi [Ros2019], Eq. 17.
 
     Columns are scaled to unit length first. The minimum norm of a dependent subset is therefore that of the torques of
     the parameters, and does not depend on units.
     """
-    others = np.setdiff1d(np.arange(problem.W.shape[1]), subset)
-    right = np.column_stack([problem.W[:, others], problem.chi])
     dependent = len(select_independent(problem.W, subset)) < subset.size
     cut = DEPENDENT if dependent else None
-    solution, *_ = np.linalg.lstsq(problem.X[:, subset], right, rcond=cut)
-    solution = solution / problem.lengths[subset, None]
-    parameters = solution[:, -1]
+    solution, *_ = np.linalg.lstsq(problem.X[:, subset], problem.chi, rcond=cut)
+    parameters = solution / problem.lengths[subset]
     error = compute_relative_error(problem, subset, parameters)
-    return Fit(parameters, solution[:, :-1], error, dependent)
+    return Fit(parameters, error, dependent)
+
+
+def compute_lumping(W: FloatArray, subset: IntArray) -> FloatArray:
+    """Return beta = W_R^+ W_E [Ros2019], Eq. 20: what the columns of a subset take over from the other ones.
+
+    Args:
+        W: Observation matrix, or its triangular factor, (n_rows, n).
+        subset: Columns of the subset, (n_kept,).
+
+    Returns:
+        (n_kept, n - n_kept); the other columns are in ascending order.
+    """
+    others = np.setdiff1d(np.arange(W.shape[1]), subset)
+    scaled, lengths = normalise_columns(W)
+    dependent = len(select_independent(W, subset)) < subset.size
+    cut = DEPENDENT if dependent else None
+    solution, *_ = np.linalg.lstsq(scaled[:, subset], W[:, others], rcond=cut)
+    result: FloatArray = solution / lengths[subset, None]
+    return result
 
 
 def compute_relative_error(

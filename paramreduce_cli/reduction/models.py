@@ -14,6 +14,7 @@ from paramreduce_cli.records import (
     ReducedModel,
     Reduction,
 )
+from paramreduce_cli.reduction.fitting import compute_lumping
 
 _STIFF = 1e-6
 """Size of a large change of a drive's parameter: much less than that of a body's."""
@@ -99,8 +100,8 @@ def make_reduced_model(
     """
     found, columns = reduction.heuristics[heuristic], reduction.columns
     whole = None if known_values is None else np.linalg.pinv(columns.expansion) @ known_values
-    order = np.argsort(found.subsets[row])
-    kept, beta = found.subsets[row][order], found.beta[row][order]
+    kept = np.sort(found.subsets[row])
+    beta = compute_lumping(reduction.factor[:, :-1], kept)
     expressions = approximate_expressions(columns.names, kept, beta, whole)
     return replace(reduction.make_model(heuristic, row), expressions=tuple(expressions))
 
@@ -123,7 +124,8 @@ def find_carriers(
     kept = found.subsets[row]
     others = np.setdiff1d(np.arange(len(columns.names)), kept)
     carriers = {}
-    for k, own in zip(kept.tolist(), found.beta[row], strict=True):
+    beta = compute_lumping(reduction.factor[:, :-1], kept)
+    for k, own in zip(kept.tolist(), beta, strict=True):
         parts = np.abs(own * values[others])
         largest = int(parts.argmax()) if parts.size else 0
         if parts.size and parts[largest] > _MOSTLY * (parts.sum() + abs(values[k])):

@@ -111,10 +111,16 @@ class Bushing(_BetweenBodies, ForceElement):
     """Stiffnesses along x, y, z, N/m, and about x, y, z, N m/rad; 0 for none."""
     viscous: Annotated[list[Value], Field(min_length=6, max_length=6)] | None = None
     """Dampings along x, y, z, N s/m, and about x, y, z, N m s/rad; 0 for none."""
+    rest: Literal["static"] | None = None
+    """static for preloads with which springs balance all other forces in the design position; without it the bushing is slack where both frames coincide."""
 
     @model_validator(mode="after")
     def _check_not_empty(self) -> Bushing:
-        """Raise ValueError if the bushing has neither stiffness nor damping."""
+        """Raise ValueError if the bushing has neither stiffness nor damping, or no known stiffness to be preloaded."""
+        if self.rest == "static" and (
+            not any(self.stiffness or ()) or "unknown" in (self.stiffness or ())
+        ):
+            raise ValueError("rest: static needs stiffnesses that are known")
         if not any((*(self.stiffness or ()), *(self.viscous or ()))):
             raise ValueError("is empty; give stiffness or viscous, six values each")
         return self
@@ -129,7 +135,8 @@ class Bushing(_BetweenBodies, ForceElement):
             }
             if values:
                 motion = self._build_motion("shift" if k < 3 else "turn", names, k % 3)
-                drive = Drive(f"{name}_{axis}", _make_no_weights(names), between=motion)
+                rest = np.nan if self.rest and values.get(Kind.STIFFNESS) else 0.0
+                drive = Drive(f"{name}_{axis}", _make_no_weights(names), rest=rest, between=motion)
                 result.append(ForceAlong(drive, values, k < 3))
         return result
 
@@ -144,7 +151,9 @@ class Tyre(_BetweenBodies, ForceElement):
     type: Literal["tyre"]
     """`tyre`: between the road, whose frame has z upwards, and the body that carries the wheel, at the wheel's centre with y along its axle to the left."""
     radius: Positive
-    """Radius without load, m: the vertical force is zero at this height of the centre above the road."""
+    """Radius without load, m: the vertical force is zero at this height of the centre above the road, unless `rest` is static."""
+    rest: Literal["static"] | None = None
+    """static for a preload with which springs balance all other forces in the design position; `radius` is then that of rolling alone."""
     spin: Name | None = None
     """Coordinate by which the wheel spins about its axle, positive where it rolls forward; needed for a longitudinal stiffness."""
     stiffness: Value | None = None
@@ -166,6 +175,10 @@ class Tyre(_BetweenBodies, ForceElement):
         keys = ("stiffness", "viscous", "spring_table", "cornering", "longitudinal")
         if all(getattr(self, key) is None for key in keys):
             raise ValueError(f"is empty; give one of {', '.join(keys)}")
+        if self.rest == "static" and (
+            self.stiffness in (None, 0, "unknown") or self.spring_table is not None
+        ):
+            raise ValueError("rest: static needs a stiffness that is known, and no spring_table")
         if self.longitudinal is not None and self.spin is None:
             raise ValueError("longitudinal needs spin, the coordinate by which the wheel spins")
         return self
@@ -182,8 +195,9 @@ class Tyre(_BetweenBodies, ForceElement):
         if values:
             table = None if self.spring_table is None else np.array(self.spring_table)
             motion = self._build_motion("shift", names, 2)
+            rest = np.nan if self.rest == "static" else self.radius
             drive = Drive(
-                name, _make_no_weights(names), rest=self.radius, spring_table=table, between=motion
+                name, _make_no_weights(names), rest=rest, spring_table=table, between=motion
             )
             result.append(ForceAlong(drive, values, True))
         kinds: tuple[tuple[MotionKind, Value | None], ...] = (

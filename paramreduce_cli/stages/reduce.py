@@ -349,7 +349,6 @@ def _make_subsets(name: str, selected: _Selected, errors: NormErrors, part: slic
         torque_error_1=errors.one[part],
         torque_error_inf=errors.infinity[part],
         parameters=tuple(f.parameters for f in selected.fits),
-        beta=tuple(f.beta for f in selected.fits),
         minimum_norm=np.array([f.minimum_norm for f in selected.fits]),
         seconds=selected.seconds,
     )

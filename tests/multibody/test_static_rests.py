@@ -9,6 +9,7 @@ from oracles.lagrange import Lagrange, forward_dynamics
 
 from paramreduce_cli.config.loading import load_config
 from paramreduce_cli.errors import ConfigError, NumericalError
+from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.multibody.loops.assembly import assemble
 from paramreduce_cli.multibody.static_rests import set_static_rests
 
@@ -90,3 +91,16 @@ def test_springs_that_cannot_balance_are_said(tmp_path, old, new, error, says):
 
     with pytest.raises(error, match=re.escape(says)):
         balance()
+
+
+def test_a_wagon_stands_on_its_wheels():
+    """All wheels carry the same weight, and nothing else moves."""
+    config = config_of("wagon")
+    values = config.get_values()
+    mechanism = set_static_rests(config.build_mechanism(), values)
+    still = np.zeros((1, mechanism.n_q))
+    torques = Dynamics(mechanism, once=True).compute_torques(still, still, still, values)[0]
+    rails = [name.startswith(("left_", "right_")) for name in mechanism.coordinate_names]
+    weight = 9.81 * (32000 + 2 * 2615 + 4 * 1813)
+    assert torques[rails] == pytest.approx(np.full(8, weight / 8), rel=1e-9)
+    assert np.abs(torques[~np.array(rails)]).max() < 1e-6 * weight

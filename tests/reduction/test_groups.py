@@ -7,6 +7,7 @@ import pytest
 from oracles.selection import all_best_errors, error_by_definition
 from selecting import dependent_problem, found, order, problem, subsets
 
+from paramreduce_cli.reduction.criteria.torque import TorqueObjective
 from paramreduce_cli.reduction.fitting import fit
 from paramreduce_cli.reduction.grouping import Group, group_columns
 from paramreduce_cli.reduction.heuristics import heuristics
@@ -105,3 +106,22 @@ def test_elimination_begins_with_what_causes_the_smallest_torques(seed):
     W = np.column_stack([W, W[:, 0] + 1e-3 * W[:, 1]])
     chi = W[:, :5] @ np.array([3.0, 1e-4, 2.0, -1.0, 1.0])
     assert order("backward-elimination", problem(W, chi))[-1] == 1
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_swaps_of_groups_improve_as_by_definition(seed):
+    """Groups of two columns each, one of them with a column that depends on the subset."""
+    pairs = tuple([k, k + 6] for k in range(6))
+    p = dependent_problem(seed, rank=11, columns=12, groups=pairs)
+    objective = TorqueObjective(p)
+    kept = (1, 4, 2)
+    before = error_by_definition(p.W, p.chi, objective.list_columns(kept)) ** 2
+    found = objective._compute_improvements(kept)
+    for place, out in enumerate(kept):
+        for into in range(6):
+            if into in kept:
+                assert found[place, into] == -np.inf
+                continue
+            swapped = objective.list_columns((*(g for g in kept if g != out), into))
+            after = error_by_definition(p.W, p.chi, swapped) ** 2
+            assert found[place, into] == pytest.approx(before - after, rel=1e-6, abs=1e-9)

@@ -33,11 +33,12 @@ def grouped_reduction():
         torque_error_1=np.zeros(2),
         torque_error_inf=np.zeros(2),
         parameters=(np.array([7.0]), np.array([4.0, 5.0, 6.0])),
-        beta=(np.array([[2.0, -1.0]]), np.zeros((3, 0))),
         minimum_norm=np.array([False, True]),
         seconds=0.0,
     )
-    return Reduction(columns, np.ones(2), 2, np.zeros((4, 4)), {"swap": found}, None)
+    # Of the columns a, both, d; both takes over 2 a - d.
+    factor = np.array([[1.0, 0, 0, 1], [2, 1, -1, 1], [0, 0, 1, 1], [0, 0, 0, 1]])
+    return Reduction(columns, np.ones(2), 2, factor, {"swap": found}, None)
 
 
 def test_tied_parameters_have_one_value():

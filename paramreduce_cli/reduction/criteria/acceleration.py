@@ -215,13 +215,13 @@ class AccelerationObjective(Objective):
         return min([kept, *proposals], key=self.score)
 
     def fit(self, subset: IntArray) -> Fit:
-        """Fit the parameters that minimise the exact acceleration error; beta is that of the torques."""
+        """Fit the parameters that minimise the exact acceleration error."""
         torque = fit(self.problem, subset)
         point = self._final.fit(subset, self._final.estimate_start(subset))
         if point is None or point.error >= _HOPELESS:
             return torque
         error = compute_relative_error(self.problem, subset, point.parameters)
-        return Fit(point.parameters, torque.beta, error, torque.minimum_norm)
+        return Fit(point.parameters, error, torque.minimum_norm)
 
 
 def acceleration(problem: SelectionProblem, inputs: CriterionInputs) -> Objective:

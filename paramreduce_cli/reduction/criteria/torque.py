@@ -79,18 +79,15 @@ class TorqueObjective(Objective):
         return result
 
     def swap_best(self, kept: Subset) -> Subset:
-        """Return the subset after the best swap.
-
-        Single columns are compared by a closed formula, groups are tried one by one.
-        """
-        if not self.single:
+        """Return the subset after the best swap, by a closed formula; groups beyond the rank are tried one by one."""
+        improvement = self._compute_improvements(kept)
+        if improvement is None and not self.single:
             out, into, error = min(
                 self._try_one_by_one(kept),
                 key=lambda exchange: exchange[2],
                 default=(-1, -1, np.inf),
             )
             return (*remove_group(kept, out), into) if error < self.score(kept) else kept
-        improvement = self._compute_improvements(kept)
         if improvement is None or not np.any(improvement > 0):
             return kept
         best = find_first_best(improvement.ravel())
@@ -99,7 +96,7 @@ class TorqueObjective(Objective):
 
     def list_promising_swaps(self, kept: Subset, most: int) -> list[Subset]:
         """Return the subsets after the swaps that lower the error most, or raise it least."""
-        improvement = self._compute_improvements(kept) if self.single else None
+        improvement = self._compute_improvements(kept)
         if improvement is None:
             found = sorted(self._try_one_by_one(kept), key=lambda exchange: exchange[2])[:most]
             return [(*remove_group(kept, out), into) for out, into, _ in found]
@@ -114,10 +111,10 @@ class TorqueObjective(Objective):
     def list_swaps_within(self, kept: Subset, limit: float) -> list[tuple[int, int, float]]:
         """Return the swaps that leave an error of at most ``limit``: (removed, added, error) each.
 
-        These are all such swaps if groups are single columns and the subset is independent; otherwise at most one for
-        each removed group, with the best group of its width.
+        These are all such swaps if the subset is independent; otherwise at most one for each removed group, with the best
+        group of its width.
         """
-        improvement = self._compute_improvements(kept) if self.single else None
+        improvement = self._compute_improvements(kept)
         if improvement is None:
             return [exchange for exchange in self._try_one_by_one(kept) if exchange[2] <= limit]
         errors = np.sqrt(np.maximum(self.score(kept) ** 2 - improvement, 0.0))
@@ -146,6 +143,8 @@ class TorqueObjective(Objective):
         left = both - Q @ projected
         inverse = np.linalg.inv(R)
         b = inverse @ projected
+        if not self.single:
+            return self._compute_group_improvements(kept, left, b, inverse)
         P = np.einsum("ij,ij->i", inverse, inverse)[:, None]
         squares = np.einsum("ij,ij->j", left[:, :-1], left[:, :-1])[None, :] + b[:, :-1] ** 2 / P
         products = (left[:, -1] @ left[:, :-1])[None, :] + b[:, :-1] * b[:, -1:] / P
@@ -153,6 +152,45 @@ class TorqueObjective(Objective):
         possible[:, list(kept)] = False
         gains = products**2 / np.where(possible, squares, 1.0)
         result: FloatArray = np.where(possible, gains - b[:, -1:] ** 2 / P, -np.inf)
+        return result
+
+    def _compute_group_improvements(
+        self, kept: Subset, left: FloatArray, b: FloatArray, inverse: FloatArray
+    ) -> FloatArray:
+        """Return the fall of the squared error for every swap of groups of the same width, (n_kept, n_groups).
+
+        Without the columns of a group, the residuals of other columns and of chi gain parts along as many directions: C,
+        with C'C = b'P^-1 b for the rows of b of the group, and P the group's block of (X'X)^-1.
+
+        Args:
+            kept: Groups of the subset.
+            left: Residuals of all columns and of chi, (k, n + 1).
+            b: Their coefficients on the subset, (n_kept_columns, n + 1).
+            inverse: Inverse of the triangular factor of the subset's columns.
+        """
+        result = np.full((len(kept), len(self.groups)), -np.inf)
+        rows = np.split(np.arange(b.shape[0]), np.cumsum(self.widths[list(kept)])[:-1])
+        for width in np.unique(self.widths[list(kept)]).tolist():
+            others = np.setdiff1d(np.flatnonzero(self.widths == width), kept)
+            if not others.size:
+                continue
+            columns = np.stack([np.flatnonzero(self.owner == group) for group in others])
+            own = left[:, columns]
+            gram = np.einsum("kgi,kgj->gij", own, own)
+            products = np.einsum("kgi,k->gi", own, left[:, -1])
+            for place, part in enumerate(rows):
+                if part.size != width:
+                    continue
+                C = np.linalg.solve(np.linalg.cholesky(inverse[part] @ inverse[part].T), b[part])
+                added, ends = C[:, columns], C[:, -1]
+                values, vectors = np.linalg.eigh(gram + np.einsum("kgi,kgj->gij", added, added))
+                along = np.einsum(
+                    "gij,gi->gj", vectors, products + np.einsum("kgi,k->gi", added, ends)
+                )
+                independent = values > DEPENDENT**2
+                gains = np.sum(along**2 / np.where(independent, values, np.inf), axis=1)
+                possible = independent.any(axis=1)
+                result[place, others] = np.where(possible, gains - ends @ ends, -np.inf)
         return result
 
     def _try_one_by_one(self, kept: Subset) -> Iterator[tuple[int, int, float]]:
