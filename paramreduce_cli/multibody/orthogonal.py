@@ -3,6 +3,7 @@
 from math import sqrt
 
 import numpy as np
+import scipy.linalg
 
 from paramreduce_cli.records import FloatArray, IntArray
 
@@ -57,6 +58,42 @@ class Orthogonaliser:
         self._basis[self._rank] = direction
         self._rank += 1
         return True
+
+    def take_all(self, columns: IntArray) -> None:
+        """Remove the directions of several columns, as :meth:`take` does one after the other, but in one go if nothing
+        was taken before.
+        """
+        if self._rank == 0 and columns.size:
+            Q, _, independent = orthogonalise(self.X[:, columns], self._dependent)
+            self.X -= Q @ (Q.T @ self.X)
+            self.X[:, columns] = 0.0
+            self.y -= Q @ (Q.T @ self.y)
+            self._rank = independent.size
+            self._basis[: self._rank] = Q.T
+            return
+        for column in columns.tolist():
+            self.take(column)
+
+
+def orthogonalise(
+    X: FloatArray, dependent: float = DEPENDENT
+) -> tuple[FloatArray, FloatArray, IntArray]:
+    """Return the orthogonal and triangular factors of the independent ones among unit columns, and these columns.
+
+    Args:
+        X: Columns of unit length or zero, (k, n).
+        dependent: Share of its length of which a column counts as dependent.
+
+    Returns:
+        Q, (k, rank), and R, (rank, rank), with Q R = X[:, columns], and the columns, (rank,).
+    """
+    if X.shape[1] <= X.shape[0]:
+        Q, R = np.linalg.qr(X)
+        if np.abs(np.diag(R)).min(initial=np.inf) > dependent:
+            return Q, R, np.arange(X.shape[1])
+    Q, R, order = scipy.linalg.qr(X, mode="economic", pivoting=True)
+    rank = int(np.sum(np.abs(np.diag(R)) > dependent))
+    return Q[:, :rank], R[:rank, :rank], order[:rank]
 
 
 def normalise_columns(W: FloatArray) -> tuple[FloatArray, FloatArray]:

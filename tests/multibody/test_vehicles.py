@@ -19,8 +19,13 @@ def measure_gaps(mechanism, q):
     gaps = []
     for closure in mechanism.loops.closures:
         pairs = zip(closure.bodies, closure.frames, strict=True)
-        a, b = (frames.frame(*pair)[:3, 3] for pair in pairs)
-        gaps += list(b - a) if closure.kind == "point" else [np.linalg.norm(b - a) - closure.length]
+        first, second = (frames.frame(*pair) for pair in pairs)
+        gap = second[:3, 3] - first[:3, 3]
+        gaps += {
+            "point": lambda gap=gap: list(gap),
+            "planar": lambda gap=gap, turn=first[:3, :3]: list(turn[:, :2].T @ gap),
+            "distance": lambda gap=gap, length=closure.length: [np.linalg.norm(gap) - length],
+        }[closure.kind]()
     return np.array(gaps)
 
 
@@ -57,6 +62,7 @@ def compute_force_columns(mechanism, q, dq):
         for kind in mechanism.find_drive_columns(drive):
             force = {
                 Kind.VISCOUS: speed,
+                Kind.COULOMB: np.sign(speed),
                 Kind.STIFFNESS: position - drive.rest,
                 Kind.CREEP: creepage,
             }.get(kind)
@@ -67,7 +73,7 @@ def compute_force_columns(mechanism, q, dq):
     return np.array(columns).T
 
 
-@pytest.mark.parametrize("robot", ["wishbone", "bogie", "car"])
+@pytest.mark.parametrize("robot", ["wishbone", "bogie", "car", "wagon", "excavator"])
 def test_rank_is_that_of_an_oracle(robot):
     model = model_of(robot)
     mechanism = model.mechanism

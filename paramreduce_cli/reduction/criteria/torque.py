@@ -1,10 +1,10 @@
 """Criterion of the Euclidean torque error, in closed form."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from paramreduce_cli.multibody.orthogonal import DEPENDENT, Orthogonaliser
+from paramreduce_cli.multibody.orthogonal import DEPENDENT, Orthogonaliser, orthogonalise
 from paramreduce_cli.records import FloatArray, IntArray
 from paramreduce_cli.reduction.inputs import CriterionInputs
 from paramreduce_cli.reduction.objective import Objective, Subset, remove_group
@@ -30,9 +30,8 @@ class TorqueObjective(Objective):
 
     def score(self, kept: Subset) -> float:
         """Return the torque error of the least-squares fit."""
-        X = self._X[:, self.list_columns(kept)]
-        solution = np.linalg.lstsq(X, self.problem.y, rcond=DEPENDENT)[0]
-        return float(np.linalg.norm(self.problem.y - X @ solution))
+        Q, _, _ = orthogonalise(self._X[:, self.list_columns(kept)])
+        return float(np.linalg.norm(self.problem.y - Q @ (Q.T @ self.problem.y)))
 
     def estimate_gains(self, kept: Subset) -> FloatArray:
         """Return the fall of the squared error per column, (n_groups,).
@@ -56,7 +55,8 @@ class TorqueObjective(Objective):
         """
         result = np.full(self.widths.size, -np.inf)
         for group, width in enumerate(self.widths.tolist()):
-            own = np.flatnonzero((self.owner == group) & (gains > -np.inf))
+            members = self._find_own_columns(np.array([group]))
+            own = members[gains[members] > -np.inf]
             if own.size and width == 1:
                 result[group] = gains[own[0]]
             elif own.size:
@@ -79,15 +79,8 @@ class TorqueObjective(Objective):
         return result
 
     def swap_best(self, kept: Subset) -> Subset:
-        """Return the subset after the best swap, by a closed formula; groups beyond the rank are tried one by one."""
+        """Return the subset after the best swap, by a closed formula."""
         improvement = self._compute_improvements(kept)
-        if improvement is None and not self.single:
-            out, into, error = min(
-                self._try_one_by_one(kept),
-                key=lambda exchange: exchange[2],
-                default=(-1, -1, np.inf),
-            )
-            return (*remove_group(kept, out), into) if error < self.score(kept) else kept
         if improvement is None or not np.any(improvement > 0):
             return kept
         best = find_first_best(improvement.ravel())
@@ -127,24 +120,25 @@ class TorqueObjective(Objective):
     def _compute_improvements(self, kept: Subset) -> FloatArray | None:
         """Return the fall of the squared error for every swap, (n_kept, n_groups), or None if the subset is dependent.
 
+        With groups of several columns a subset may be dependent; the fall is then at least the one returned.
+
         Let r and e be the residuals of another column and of chi after projection on the subset, b the coefficients of
         either on the subset, and P = (X'X)^-1. Without column i these residuals become r + b_i u and e + b_i u with
         |u|^2 = 1 / P_ii, where u is orthogonal to r and e.
         """
         columns = self.list_columns(kept)
-        if columns.size > self._X.shape[0]:
-            return None
-        Q, R = np.linalg.qr(self._X[:, columns])
-        diagonal = np.abs(np.diag(R))
-        if diagonal.min() <= DEPENDENT:
+        Q, R, independent = orthogonalise(self._X[:, columns])
+        if self.single and independent.size < columns.size:
             return None
         both = np.column_stack([self._own, self.problem.y])
         projected = Q.T @ both
         left = both - Q @ projected
-        inverse = np.linalg.inv(R)
-        b = inverse @ projected
+        inverse = np.asarray(np.linalg.inv(R), dtype=float)
+        b = np.asarray(inverse @ projected, dtype=float)
         if not self.single:
-            return self._compute_group_improvements(kept, left, b, inverse)
+            place = np.repeat(np.arange(len(kept)), self.widths[list(kept)])[independent]
+            rows = [np.flatnonzero(place == k) for k in range(len(kept))]
+            return self._compute_group_improvements(kept, rows, left, b, inverse)
         P = np.einsum("ij,ij->i", inverse, inverse)[:, None]
         squares = np.einsum("ij,ij->j", left[:, :-1], left[:, :-1])[None, :] + b[:, :-1] ** 2 / P
         products = (left[:, -1] @ left[:, :-1])[None, :] + b[:, :-1] * b[:, -1:] / P
@@ -155,7 +149,12 @@ class TorqueObjective(Objective):
         return result
 
     def _compute_group_improvements(
-        self, kept: Subset, left: FloatArray, b: FloatArray, inverse: FloatArray
+        self,
+        kept: Subset,
+        rows: Sequence[IntArray],
+        left: FloatArray,
+        b: FloatArray,
+        inverse: FloatArray,
     ) -> FloatArray:
         """Return the fall of the squared error for every swap of groups of the same width, (n_kept, n_groups).
 
@@ -164,22 +163,22 @@ class TorqueObjective(Objective):
 
         Args:
             kept: Groups of the subset.
+            rows: Rows of b of each of these groups; none for columns that depend on others.
             left: Residuals of all columns and of chi, (k, n + 1).
-            b: Their coefficients on the subset, (n_kept_columns, n + 1).
+            b: Their coefficients on the independent columns of the subset, (rank, n + 1).
             inverse: Inverse of the triangular factor of the subset's columns.
         """
         result = np.full((len(kept), len(self.groups)), -np.inf)
-        rows = np.split(np.arange(b.shape[0]), np.cumsum(self.widths[list(kept)])[:-1])
         for width in np.unique(self.widths[list(kept)]).tolist():
             others = np.setdiff1d(np.flatnonzero(self.widths == width), kept)
             if not others.size:
                 continue
-            columns = np.stack([np.flatnonzero(self.owner == group) for group in others])
+            columns = self._find_own_columns(others).reshape(-1, width)
             own = left[:, columns]
             gram = np.einsum("kgi,kgj->gij", own, own)
             products = np.einsum("kgi,k->gi", own, left[:, -1])
             for place, part in enumerate(rows):
-                if part.size != width:
+                if self.widths[kept[place]] != width:
                     continue
                 C = np.linalg.solve(np.linalg.cholesky(inverse[part] @ inverse[part].T), b[part])
                 added, ends = C[:, columns], C[:, -1]
@@ -211,11 +210,16 @@ class TorqueObjective(Objective):
         projected, rest = self._taken
         if kept[: len(projected)] != projected:
             projected, rest = (), self._start_orthogonaliser()
-        for group in kept[len(projected) :]:
-            for column in [group] if self.single else np.flatnonzero(self.owner == group).tolist():
-                rest.take(column)
+        added = np.array(kept[len(projected) :], dtype=np.int64)
+        if added.size:
+            rest.take_all(added if self.single else self._find_own_columns(added))
         self._taken = (kept, rest)
         return rest
+
+    def _find_own_columns(self, groups: IntArray) -> IntArray:
+        """Return the positions of the columns of some groups among all columns, group by group."""
+        ends = np.cumsum(self.widths)
+        return np.concatenate([np.arange(ends[g] - self.widths[g], ends[g]) for g in groups])
 
 
 def _compute_removal_costs(X: FloatArray, y: FloatArray, groups: list[IntArray]) -> FloatArray:
@@ -232,11 +236,14 @@ def _compute_removal_costs(X: FloatArray, y: FloatArray, groups: list[IntArray])
     if rank < columns.size:
         free = [np.linalg.matrix_rank(null[part], tol=1e-6) == part.size for part in parts]
         if any(free):
-            own = [
+            torques = [
                 float(phi[p] @ phi[p]) if f else np.inf for p, f in zip(parts, free, strict=True)
             ]
-            return np.array(own) / sizes
-        return np.array([_compute_rise(X[:, columns], y, part) for part in parts]) / sizes
+            return np.array(torques) / sizes
+        own = X[:, columns]
+        whole = _compute_squared_error(own, y)
+        rises = [_compute_squared_error(np.delete(own, part, axis=1), y) - whole for part in parts]
+        return np.array(rises) / sizes
     inverse = (Vt.T / s**2) @ Vt
     if (sizes == 1).all():
         alone: FloatArray = phi**2 / np.diag(inverse)
@@ -245,12 +252,8 @@ def _compute_removal_costs(X: FloatArray, y: FloatArray, groups: list[IntArray])
     return np.array(rises) / sizes
 
 
-def _compute_rise(X: FloatArray, y: FloatArray, part: IntArray) -> float:
-    """Return the rise of the squared error without some columns, from two fits."""
-
-    def compute_squared_error(kept: FloatArray) -> float:
-        """Return the squared error of the fit with some columns."""
-        left = y - kept @ np.linalg.lstsq(kept, y, rcond=DEPENDENT)[0] if kept.size else y
-        return float(left @ left)
-
-    return compute_squared_error(np.delete(X, part, axis=1)) - compute_squared_error(X)
+def _compute_squared_error(X: FloatArray, y: FloatArray) -> float:
+    """Return the squared error of the least-squares fit of y by columns of unit length."""
+    Q, _, _ = orthogonalise(X)
+    left = y - Q @ (Q.T @ y)
+    return float(left @ left)
