@@ -271,8 +271,8 @@ def _check_simulation(config: Config) -> Iterator[Problem]:
     if still and config.nominal_torque == "standard-deviation":
         yield (
             ("nominal_torque",),
-            f"is missing: {', '.join(still)} has no input and so no torque, whose standard deviation is no scale. Give "
-            "characteristic torques of all independent coordinates, N m (N)",
+            f"is missing: without an input there is no torque, whose standard deviation is no scale, on {', '.join(still)}. Give "
+            f"one value, or one for each of {', '.join(names)}, in this order, N m (N)",
         )
 
 

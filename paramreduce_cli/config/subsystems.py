@@ -61,6 +61,10 @@ def expand_subsystems(document: Document) -> list[Problem]:
             copied = _Copy(subsystems[name], use)
             # Where one name clashes, so do all.
             problems += _merge(document, ("subsystems", name), copied.write(), place)[:1]
+            problems += [
+                ((*place, "names", other), f"subsystem {name!r} refers to no {other!r} outside")
+                for other in copied.list_unused_names()
+            ]
     return problems
 
 
@@ -150,6 +154,8 @@ class _Copy:
         self._subsystem, self._suffix = subsystem, str(use.get("suffix", ""))
         outside, shift, mirror = use.get("names"), use.get("shift"), use.get("mirror")
         self._outside: dict[Any, Any] = outside if isinstance(outside, dict) else {}
+        self._replaced: set[Any] = set()
+        """Names outside that this use has replaced."""
         self._shift = shift if isinstance(shift, list) and len(shift) == 3 else None
         self._flipped = "xyz".find(mirror) if isinstance(mirror, str) and mirror else -1
         self._defaults: dict[str, str] = {}
@@ -198,7 +204,14 @@ class _Copy:
             return self._defaults[str(name)]
         if str(name) in self._own:
             return f"{name}{self._suffix}"
-        return self._outside.get(name, name)
+        if name in self._outside:
+            self._replaced.add(name)
+            return self._outside[name]
+        return name
+
+    def list_unused_names(self) -> list[Any]:
+        """Return the names outside that the subsystem, once it is written, does not refer to."""
+        return [name for name in self._outside if name not in self._replaced]
 
     def _write_body(self, body: dict[str, Any]) -> dict[str, Any]:
         """Return a body of the copy."""

@@ -21,8 +21,8 @@ def find_leanest(
     """Return the function with the fewest operations whose errors are within the tolerances, or None.
 
     The tolerances are those under ``selected`` for both sets; without these, the budgets of pruned terms for their
-    sets; without these, the defaults. Errors of accelerations count for the direct dynamics only, whose mass matrices
-    must be positive definite on both sets.
+    sets; without these, the defaults. Errors of accelerations count for the direct dynamics only. Their mass matrices
+    must be positive definite on both sets, and so must those of inverse dynamics that are to simulate, too.
 
     Args:
         function: ``inverse`` or ``direct``.
@@ -46,8 +46,9 @@ def find_leanest(
     limits = {
         (key, part): limit for key, limit in (tolerances or usual).items() for part in looked_at
     }
+    simulated = function == "direct" or section.use == "simulation"
     found = [
-        *_iterate_models(function, limits, results),
+        *_iterate_models(function, limits, results, simulated),
         *_iterate_term_models(function, limits, terms),
     ]
     return min(found, key=_rank, default=None)
@@ -64,11 +65,15 @@ def _rank(candidate: Leanest) -> tuple[int, float]:
     return candidate.operations, candidate.torque_error.estimation
 
 
-def _iterate_models(function: str, limits: _Limits, results: Results) -> Iterator[Leanest]:
-    """Yield the functions of models with only parameters removed, as far as their operations are known."""
+def _iterate_models(
+    function: str, limits: _Limits, results: Results, simulated: bool
+) -> Iterator[Leanest]:
+    """Yield the functions of models with only parameters removed, as far as their operations are known; of models to
+    simulate with only those with positive definite mass matrices.
+    """
     for heuristic, result in results.items():
         kept = [getattr(result, key)[part] <= limit for (key, part), limit in limits.items()]
-        if function == "direct":
+        if simulated:
             kept.append(result.mass_matrix.smallest_eigenvalue > 0)
         operations = result.operations[function]
         kept.append(np.isfinite(operations))

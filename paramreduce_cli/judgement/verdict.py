@@ -86,10 +86,9 @@ def _check_subsets(
 ) -> Iterator[tuple[BoolArray, str, str]]:
     """Yield which subsets are not safe to use, why, and what that means for the selected model."""
     unsafe = find_unsafe_models(full, result)
-    last = int(result.n[unsafe].max(initial=0))
     yield (
         unsafe,
-        f"n ≤ {last}: do not simulate; the mass matrix is indefinite on some samples, or more than "
+        f"n = {', '.join(_format_ranges(result.n[unsafe].tolist()))}: do not simulate; the mass matrix is indefinite on some samples, or more than "
         f"{_CONDITION_FACTOR:g} times nearer to singular than with all parameters.",
         "is good for inverse dynamics only; do not simulate with it.",
     )

@@ -20,6 +20,8 @@ _STIFF = 1e-6
 """Size of a large change of a drive's parameter: much less than that of a body's."""
 _MOSTLY = 0.5
 """Fraction of a lumped value from which on a parameter makes up most of it."""
+_NOTHING = 1e-9
+"""Fraction of the torques below which a parameter's contribution is round-off."""
 
 
 def list_choices(reduction: Reduction) -> list[str]:
@@ -123,11 +125,13 @@ def find_carriers(
     values = np.linalg.pinv(columns.expansion) @ known_values
     kept = found.subsets[row]
     others = np.setdiff1d(np.arange(len(columns.names)), kept)
+    lengths = np.linalg.norm(reduction.factor, axis=0)
     carriers = {}
     beta = compute_lumping(reduction.factor[:, :-1], kept)
     for k, own in zip(kept.tolist(), beta, strict=True):
         parts = np.abs(own * values[others])
         largest = int(parts.argmax()) if parts.size else 0
-        if parts.size and parts[largest] > _MOSTLY * (parts.sum() + abs(values[k])):
+        known = parts[largest] > _MOSTLY * (parts.sum() + abs(values[k])) if parts.size else False
+        if known and parts[largest] * lengths[k] > _NOTHING * lengths[-1]:
             carriers[columns.names[k]] = columns.names[int(others[largest])]
     return carriers

@@ -63,8 +63,9 @@ class PageSection(Enum):
     MANOEUVRE = (
         "Simulated manoeuvre",
         "The first manoeuvre of the test set (validation set without one), simulated with all and with the selected "
-        "parameters: under the same inputs, each from its own start. Deviations are root mean squares over time, relative to "
-        "those of the full model's motion.",
+        "parameters, under the same inputs and on the same road; a motion that begins in static equilibrium begins in that of "
+        "its own model. Deviations are root mean squares over time, relative to that of the full model's motion; steady "
+        "travel counts as motion.",
         True,
         True,
     )

@@ -253,7 +253,13 @@ class TreeDescription(BodiesDescription):
     def _check_closures(self) -> TreeDescription:
         """Raise ValueError unless closures and independent coordinates are given together."""
         if bool(self.closures) != bool(self.independent):
-            raise ValueError("closures and independent belong together; give both or neither")
+            text = (
+                "has closures, but no independent; name the coordinates that are actuated and determine the others"
+                if self.closures
+                else "has independent, but no closures; leave out independent, also in subsystems: without loops all coordinates "
+                "are independent"
+            )
+            raise ValueError(text)
         if self.guess and not self.closures:
             raise ValueError("a guess is for closing loops, but there are no closures")
         return self

@@ -238,3 +238,9 @@ def test_a_shift_has_three_components(tmp_path):
 def test_a_use_without_a_subsystem_is_said(tmp_path):
     with pytest.raises(ConfigError, match=r"uses\.0\.subsystem"):
         load(tmp_path, MIRRORED.replace("subsystem: arm, suffix: _l", "suffix: _l"), axis="x")
+
+
+def test_a_name_for_nothing_is_said(tmp_path):
+    text = SHIFTED.replace("names: {{trunk: tail}}", "names: {{frame: tail}}")
+    with pytest.raises(ConfigError, match=r"refers to no 'frame' outside"):
+        load(tmp_path, text, axis="x")

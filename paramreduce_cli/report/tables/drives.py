@@ -30,7 +30,8 @@ def drives(data: ReportData) -> Table:
         if Kind.STRIBECK in columns:
             sign += f"; Stribeck beyond {drive.stribeck_velocity:g}"
         sprung = {Kind.STIFFNESS, Kind.SPRING_TABLE} & columns.keys()
-        slack = f"{drive.rest:g}" if sprung else ""
+        unit = "m" if any(mechanism.parameters[k].sliding for k in columns.values()) else "rad"
+        slack = f"{drive.rest:g} {unit}" if sprung else ""
         rows.append((drive.name, _describe_motion(mechanism, drive), *cells, sign, slack))
     header = ("drive", "motion", *(kind.symbol for kind in kinds), "sign of speed", "slack at")
     return Table("Rotors, friction and springs", header, tuple(rows))
