@@ -295,7 +295,10 @@ def test_simulated_samples_need_no_limits_but_characteristic_torques(tmp_path):
     path = tmp_path / "quarter_car.yaml"
     path.write_text(text.replace("nominal_torque: [2000, 2000]\n", ""))
     (message,) = errors_of(path)
-    assert "nominal_torque is missing: without an input there is no torque, whose standard deviation is no scale, on z_chassis" in message
+    assert (
+        "nominal_torque is missing: without an input there is no torque, whose standard deviation is no scale, on z_chassis"
+        in message
+    )
     assert "N m" in message
 
 
