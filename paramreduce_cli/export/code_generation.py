@@ -53,6 +53,10 @@ class Exported(StrEnum):
     DDM = "ddm"
     BOTH = "both"
     REGRESSOR = "regressor"
+    GRAVITY = "gravity"
+    CORIOLIS = "coriolis"
+    NONLINEAR = "nonlinear"
+    MASS_MATRIX = "mass-matrix"
 
 
 _FUNCTIONS = {
@@ -60,7 +64,14 @@ _FUNCTIONS = {
     Exported.DDM: (LeanFunctions.make_direct,),
     Exported.BOTH: (LeanFunctions.make_inverse, LeanFunctions.make_direct),
     Exported.REGRESSOR: (LeanFunctions.make_regressor,),
+    Exported.GRAVITY: (LeanFunctions.make_gravity,),
+    Exported.CORIOLIS: (LeanFunctions.make_coriolis,),
+    Exported.NONLINEAR: (LeanFunctions.make_nonlinear,),
+    Exported.MASS_MATRIX: (LeanFunctions.make_mass_matrix,),
 }
+
+
+_WITH_MASS_MATRIX = (Exported.DDM, Exported.BOTH, Exported.MASS_MATRIX)
 
 
 def make_exported_model(
@@ -117,7 +128,7 @@ def make_exported_model(
         check_loop_problems(problems, least_pivots, checked, least)
     unsafe = ""
     # Without some terms M was positive definite wherever it was looked at where that holds; these states may be beyond.
-    if simplified is None and what in (Exported.DDM, Exported.BOTH):
+    if simplified is None and what in _WITH_MASS_MATRIX:
         massive = find_massive_coordinates(model, checked)
         unsafe = find_unsafe_mass_matrices(checked["M"][:, massive][:, :, massive])
     if unsafe:

@@ -1,6 +1,7 @@
 """Whether exported functions compute what textbook recursion does."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -8,6 +9,7 @@ import numpy as np
 from paramreduce_cli.export.term_sizes import find_entry_sizes
 from paramreduce_cli.expressions.functions import Function
 from paramreduce_cli.expressions.programs import Program
+from paramreduce_cli.lean.lean_functions import find_inertial_parameters
 from paramreduce_cli.lean.lean_verification import TOLERANCE, reject_if_wrong
 from paramreduce_cli.multibody.dynamics import SINGULAR_MASS, Dynamics
 from paramreduce_cli.multibody.loops.coordinates import Coordinates
@@ -48,6 +50,9 @@ def make_random_cases(
     expansion = (model.position[:, None] == np.arange(model.n)).astype(float)
     M, delta = plain.compute_mass_matrix_and_bias(q, dq, phi)
     K = plain.compute_regressor(q, dq, ddq)
+    weightless = Dynamics(replace(mechanism, gravity=np.zeros(3)), once=True)
+    inertial = np.where(find_inertial_parameters(mechanism), phi, 0.0)
+    still = np.zeros_like(q)
     result = {
         "phi": np.tile(model.values, (count, 1)),
         "q": q,
@@ -56,6 +61,8 @@ def make_random_cases(
         "tau": K @ phi,
         "M": M,
         "delta": delta,
+        "g": plain.compute_torques(q, still, still, phi),
+        "c": weightless.compute_mass_matrix_and_bias(q, dq, inertial)[1],
         "K": K @ expansion,
     }
     if mechanism.loops is None:

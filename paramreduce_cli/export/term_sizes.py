@@ -41,6 +41,8 @@ def estimate_term_sizes(
     sizes = {
         "tau": float(moments @ values),
         "delta": float(moments @ values),
+        "g": float(moments @ values),
+        "c": float(moments @ values),
         "M": float(inertias @ values),
         "K": float(kept[kept > 0].min()) if kept.any() else 0.0,
         "gamma": reach * speed**2,
@@ -71,7 +73,7 @@ def find_entry_sizes(name: str, expected: FloatArray, least: float) -> FloatArra
     Returns:
         An array that broadcasts to one state of the result.
     """
-    if name in ("tau", "delta"):
+    if name in ("tau", "delta", "g", "c"):
         return np.maximum(np.abs(expected).max(axis=0), least)
     if name == "M":
         diagonal = np.sqrt(np.abs(np.diagonal(expected, axis1=1, axis2=2)).max(axis=0))

@@ -1,6 +1,7 @@
 """The functions that a model consists of, for a set of parameters, ready for export."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import replace
 
 import casadi as ca
 import numpy as np
@@ -9,10 +10,18 @@ from paramreduce_cli.expressions.factoring import Values, minimise_operations
 from paramreduce_cli.expressions.functions import Argument, Function
 from paramreduce_cli.expressions.graph import ZERO, Graph
 from paramreduce_cli.expressions.programs import Program
-from paramreduce_cli.lean.lean_models import get_lean_models
+from paramreduce_cli.lean.lean_models import LeanModels, get_lean_models
 from paramreduce_cli.lean.loop_projection import project_direct_outputs, project_inverse_outputs
 from paramreduce_cli.multibody.loops.closures import express_equations
-from paramreduce_cli.records import Model, ReducedModel, TermModel
+from paramreduce_cli.records import (
+    INERTIAL,
+    BoolArray,
+    Kind,
+    Mechanism,
+    Model,
+    ReducedModel,
+    TermModel,
+)
 
 
 class LeanFunctions:
@@ -34,7 +43,7 @@ class LeanFunctions:
         simplified: TermModel | None = None,
     ) -> None:
         mechanism = model.mechanism
-        self._simplified = simplified
+        self._model, self._simplified = model, simplified
         self._mechanism = mechanism
         self._models = get_lean_models(model, independent=True)
         self._reduced = reduced.drop_unaffecting(model.affecting)
@@ -70,10 +79,89 @@ class LeanFunctions:
         delta = Argument("delta", (z,), "torques without acceleration, N m or N")
         text = "Mass matrix and remainder, gravity and friction included: tau = M ddz + delta."
         graph, outputs = self._build_lean_outputs(self._models.build_direct, project_direct_outputs)
-        lower, bias = outputs[:-z], outputs[-z:]
-        rows = range(z)
-        full = [lower[max(i, j) * (max(i, j) + 1) // 2 + min(i, j)] for i in rows for j in rows]
-        return self._make_function("direct_dynamics", text, (M, delta), graph, full + bias)
+        full = _fill_symmetric(outputs[:-z], z) + outputs[-z:]
+        return self._make_function("direct_dynamics", text, (M, delta), graph, full)
+
+    def make_gravity(self) -> Function:
+        """Return the function that gives the torques at rest."""
+        g = Argument("g", (self._mechanism.n_dof,), "torques at rest, N m or N")
+        text = (
+            "Torques of the independent coordinates at rest: gravity, springs and constant torques."
+        )
+        still = {*self._list_inputs("dq"), *self._list_inputs("ddq")}
+        return self._make_part("gravity", text, g, self._models, self._reduced, still)
+
+    def make_nonlinear(self) -> Function:
+        """Return the function that gives the torques without acceleration."""
+        delta = Argument(
+            "delta", (self._mechanism.n_dof,), "torques without acceleration, N m or N"
+        )
+        text = "Torques without acceleration, gravity and friction included: tau = M ddz + delta."
+        return self._make_part(
+            "nonlinear_effects", text, delta, self._models, self._reduced, set(), direct=True
+        )
+
+    def make_coriolis(self) -> Function:
+        """Return the function that gives Coriolis and centrifugal torques."""
+        c = Argument("c", (self._mechanism.n_dof,), "Coriolis and centrifugal torques, N m or N")
+        text = "Coriolis and centrifugal torques C dz, without gravity, springs and friction."
+        weightless = replace(self._mechanism, gravity=np.zeros(3))
+        models = LeanModels(replace(self._model, mechanism=weightless), independent=True)
+        inertial = self._reduced.drop_unaffecting(find_inertial_parameters(self._mechanism))
+        return self._make_part("coriolis", text, c, models, inertial, set(), direct=True)
+
+    def make_mass_matrix(self) -> Function:
+        """Return the function that gives the mass matrix."""
+        z = self._mechanism.n_dof
+        M = Argument("M", (z, z), "mass matrix")
+        return self._make_part(
+            "mass_matrix", "Mass matrix.", M, self._models, self._reduced, set(), direct=True
+        )
+
+    def _make_part(
+        self,
+        name: str,
+        text: str,
+        result: Argument,
+        models: LeanModels,
+        reduced: ReducedModel,
+        zero: Collection[int],
+        *,
+        direct: bool = False,
+    ) -> Function:
+        """Return a function of a part of the dynamics.
+
+        Args:
+            name: Name of the function.
+            text: Sentence on what the function computes.
+            result: Result; a mass matrix is the lower triangle of the direct dynamics, anything else its bias.
+            models: Lean models that the part is taken from.
+            reduced: Parameters that are kept.
+            zero: Positions of the inputs that are zero.
+            direct: Whether the part is taken from the direct dynamics, not from the inverse.
+        """
+        z = self._mechanism.n_dof
+        square = len(result.shape) == 2
+        outputs_kept = slice(0, -z) if square else slice(-z, None)
+        program = models.build_part(
+            reduced, direct=direct, outputs=outputs_kept, zero=zero, constant=self._constant
+        )
+        if direct and not square and self._mechanism.loops is None:
+            # Without loops the bias is also the inverse dynamics without accelerations.
+            other = models.build_part(
+                reduced, direct=False, outputs=outputs_kept, zero=self._list_inputs("ddq"), constant=self._constant
+            )  # fmt: skip
+            program = min(program, other, key=lambda one: one.n_operations)
+        graph, outputs = self._renumber(program)
+        if square:
+            outputs = _fill_symmetric(outputs, z)
+        return self._make_function(name, text, (result,), graph, outputs)
+
+    def _list_inputs(self, name: str) -> range:
+        """Return the positions of the velocities dq or accelerations ddq among the inputs of lean models."""
+        n, start = self._mechanism.n_q, self._models.n_parameters
+        place = ("q", "dq", "ddq").index(name)
+        return range(start + place * n, start + (place + 1) * n)
 
     def make_regressor(self) -> Function:
         """Return the function that gives the regressor: torques are linear in the parameters."""
@@ -108,6 +196,10 @@ class LeanFunctions:
             program = self._build_pruned_program(self._simplified, project)
         else:
             program = model(self._reduced, constant=self._constant)
+        return self._renumber(program)
+
+    def _renumber(self, program: Program) -> tuple[Graph, list[int]]:
+        """Return the outputs of a program of lean models in a graph whose inputs are the kept parameters, then the others."""
         start, n, place = self._models.n_parameters, self._reduced.n, self._reduced.position
         graph = Graph()
 
@@ -149,6 +241,10 @@ class LeanFunctions:
         needed = {
             "inverse_dynamics": {"phi", "q", "dq", "ddq", "R"},
             "direct_dynamics": {"phi", "q", "dq", "R", "b"},
+            "nonlinear_effects": {"phi", "q", "dq", "R", "b"},
+            "coriolis": {"phi", "q", "dq", "R", "b"},
+            "mass_matrix": {"phi", "q", "R"},
+            "gravity": {"phi", "q", "R"},
             "regressor": {"q", "dq", "ddq", "R"},
         }[name]
         if self._constant:
@@ -194,3 +290,15 @@ class LeanFunctions:
                 "closure_bias", "Right side of the acceleration problem.", [q, dq], [gamma], right
             ),
         ]
+
+
+def find_inertial_parameters(mechanism: Mechanism) -> BoolArray:
+    """Return which parameters are those of masses and rotors, and not of friction and springs, (n_parameters,)."""
+    kinds = {*INERTIAL, Kind.ROTOR}
+    return np.array([parameter.kind in kinds for parameter in mechanism.parameters], dtype=bool)
+
+
+def _fill_symmetric(lower: Sequence[int], n: int) -> list[int]:
+    """Return all entries of a symmetric matrix, row by row, from those of its lower triangle."""
+    rows = range(n)
+    return [lower[max(i, j) * (max(i, j) + 1) // 2 + min(i, j)] for i in rows for j in rows]

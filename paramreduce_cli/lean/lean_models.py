@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache, partial
 from typing import TYPE_CHECKING
@@ -158,6 +158,31 @@ class LeanModels:
         """
         return self._build_leanest(self._direct, model, constant, rewritten)
 
+    def build_part(
+        self,
+        model: ReducedModel,
+        *,
+        direct: bool,
+        outputs: slice,
+        zero: Collection[int] = (),
+        constant: bool = False,
+    ) -> Program:
+        """Return some outputs of the inverse or direct dynamics of a model, with some inputs zero, rewritten.
+
+        Args:
+            model: Model that says which parameters are kept, and which have one value.
+            direct: Whether the outputs are those of the direct dynamics, not of the inverse.
+            outputs: Outputs that are kept.
+            zero: Positions of the inputs that are zero, such as those of accelerations.
+            constant: Whether the values of the parameters are part of the program.
+        """
+        variants = self._direct if direct else self._inverse
+        candidates = []
+        for program in variants.programs:
+            part = replace(program, outputs=program.outputs[outputs])
+            candidates.append(self._specialise_program(part, model, constant, frozenset(zero)))
+        return Program.from_graph(*minimise_operations(candidates))
+
     def choose_formulation(self, model: ReducedModel, *, direct: bool = False) -> Formulation:
         """Return the formulation that takes the fewest operations for a model, before rewriting."""
         variants = self._direct if direct else self._inverse
@@ -230,8 +255,14 @@ class LeanModels:
         numbers = variants.select_promising(self._mark_dropped(model.kept))
         return {k: self._specialise_program(variants.programs[k], model, constant) for k in numbers}
 
-    def _specialise_program(self, program: Program, model: ReducedModel, constant: bool) -> Values:
-        """Return the values of a program in which the parameters that a model drops are zero.
+    def _specialise_program(
+        self,
+        program: Program,
+        model: ReducedModel,
+        constant: bool,
+        zero: frozenset[int] = frozenset(),
+    ) -> Values:
+        """Return the values of a program in which the parameters that a model drops, and some other inputs, are zero.
 
         Tied parameters are one input, or with ``constant`` all kept ones are numbers.
         """
@@ -241,6 +272,8 @@ class LeanModels:
 
         def substitute(position: int) -> int:
             """Return what takes the place of an input: zero, a number, or an input."""
+            if position in zero:
+                return ZERO
             if position >= self.n_parameters:
                 return graph.input(position)
             if position not in kept:

@@ -93,7 +93,7 @@ def printed(text):
 
 
 @needs_eigen
-@pytest.mark.parametrize("what", ["both", "regressor"])
+@pytest.mark.parametrize("what", ["both", "regressor", "gravity"])
 @pytest.mark.parametrize("compiler", ["g++", "clang++"])
 def test_the_face_for_cpp_gives_what_the_self_test_expects(model, tmp_path, compiler, what):
     if shutil.which(compiler) is None:
@@ -110,7 +110,8 @@ def test_the_face_for_cpp_gives_what_the_self_test_expects(model, tmp_path, comp
         model.mechanism, chosen, 200, rng
     )  # those that are checked before it is written
     cases = make_random_cases(model.mechanism, chosen, 16, rng)
-    assert set(found) == ({"K"} if what == "regressor" else {"tau", "M", "delta"})
+    results = {"both": {"tau", "M", "delta"}, "regressor": {"K"}, "gravity": {"g"}}
+    assert set(found) == results[what]
     for key, values in found.items():
         assert values == pytest.approx(np.ravel(cases[key][0]), rel=1e-9, abs=1e-9)
 
