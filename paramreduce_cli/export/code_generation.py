@@ -57,6 +57,9 @@ class Exported(StrEnum):
     CORIOLIS = "coriolis"
     NONLINEAR = "nonlinear"
     MASS_MATRIX = "mass-matrix"
+    CORIOLIS_MATRIX = "coriolis-matrix"
+    DERIVATIVES = "derivatives"
+    FORWARD_DYNAMICS = "forward-dynamics"
 
 
 _FUNCTIONS = {
@@ -68,10 +71,13 @@ _FUNCTIONS = {
     Exported.CORIOLIS: (LeanFunctions.make_coriolis,),
     Exported.NONLINEAR: (LeanFunctions.make_nonlinear,),
     Exported.MASS_MATRIX: (LeanFunctions.make_mass_matrix,),
+    Exported.CORIOLIS_MATRIX: (LeanFunctions.make_coriolis_matrix,),
+    Exported.DERIVATIVES: (LeanFunctions.make_derivatives,),
+    Exported.FORWARD_DYNAMICS: (LeanFunctions.make_forward_dynamics,),
 }
 
 
-_WITH_MASS_MATRIX = (Exported.DDM, Exported.BOTH, Exported.MASS_MATRIX)
+_WITH_MASS_MATRIX = (Exported.DDM, Exported.BOTH, Exported.MASS_MATRIX, Exported.FORWARD_DYNAMICS)
 
 
 def make_exported_model(
@@ -117,7 +123,8 @@ def make_exported_model(
         problems, least_pivots = kinematics.make_problems(), kinematics.least_pivots
     report_progress(Progress(_TASK, 1, 2, "checks"))
     rng = np.random.default_rng(0)
-    checked = make_random_cases(mechanism, chosen, _CHECKED, rng, simplified)
+    result_names = {result.name for function in functions for result in function.results}
+    checked = make_random_cases(mechanism, chosen, _CHECKED, rng, simplified, result_names)
     least = estimate_term_sizes(mechanism, chosen, checked)
     check(functions, checked, least)
     whole = np.array_equal(chosen.standard[model.affecting], model.values[model.affecting])
@@ -139,7 +146,7 @@ def make_exported_model(
     used = {a.name for f in functions for a in (*f.arguments, *f.results)}
     if mechanism.loops is not None:
         used |= _LOOPS
-    stored = make_random_cases(mechanism, chosen, _CASES, rng, simplified)
+    stored = make_random_cases(mechanism, chosen, _CASES, rng, simplified, result_names)
     report_progress(Progress(_TASK, 2, 2))
     return ExportedModel(
         robot=mechanism.robot,

@@ -1,6 +1,6 @@
 """Whether exported functions compute what textbook recursion does."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -14,6 +14,7 @@ from paramreduce_cli.lean.lean_verification import TOLERANCE, reject_if_wrong
 from paramreduce_cli.multibody.dynamics import SINGULAR_MASS, Dynamics
 from paramreduce_cli.multibody.loops.coordinates import Coordinates
 from paramreduce_cli.multibody.random_states import draw_states
+from paramreduce_cli.multibody.torque_derivatives import compute_derivatives
 from paramreduce_cli.records import FloatArray, IntArray, Mechanism, Model, ReducedModel, TermModel
 
 _FEW = 3
@@ -28,6 +29,7 @@ def make_random_cases(
     count: int,
     rng: np.random.Generator,
     simplified: TermModel | None = None,
+    result_names: Collection[str] = (),
 ) -> dict[str, FloatArray]:
     """Return random states and the results of textbook recursion, by the names of the functions' arrays.
 
@@ -40,6 +42,7 @@ def make_random_cases(
         count: Number of states.
         rng: Random generator.
         simplified: A function with pruned terms.
+        result_names: Names of the results that are needed; derivatives are computed if they are among these.
     """
     q, dq, ddq = draw_states(mechanism, count, rng)
     if simplified is not None and mechanism.loops is None:
@@ -65,6 +68,8 @@ def make_random_cases(
         "c": weightless.compute_mass_matrix_and_bias(q, dq, inertial)[1],
         "K": K @ expansion,
     }
+    if {"C", "dtau_dq", "dtau_ddq"} & set(result_names):
+        result |= compute_derivatives(mechanism, phi, q, dq, ddq)
     if mechanism.loops is None:
         return result | _evaluate_pruned(simplified, result, np.eye(mechanism.n_q)[None])
     dependent, independent = list(mechanism.dependent), list(mechanism.independent)

@@ -37,6 +37,7 @@ def estimate_term_sizes(
     moments = _assign_by_kind(mechanism, reach * fall, fall, change) * tangent
     inertias = _assign_by_kind(mechanism, reach**2, reach, 1.0) * tangent**2
     values = np.abs(model.standard)
+    bend = float(moments @ values)
     kept = moments[model.kept]
     sizes = {
         "tau": float(moments @ values),
@@ -44,6 +45,9 @@ def estimate_term_sizes(
         "g": float(moments @ values),
         "c": float(moments @ values),
         "M": float(inertias @ values),
+        "C": float(inertias @ values) * speed,
+        "dtau_dq": bend,
+        "dtau_ddq": float(inertias @ values) * speed,
         "K": float(kept[kept > 0].min()) if kept.any() else 0.0,
         "gamma": reach * speed**2,
         "Phi": reach,

@@ -107,6 +107,11 @@ class Program:
         )
         return cls(nodes, renumber(outputs))
 
+    def to_graph(self) -> tuple[Graph, list[int]]:
+        """Return a graph of the program with the same inputs, and its outputs."""
+        graph = Graph()
+        return graph, self.rebuild(graph, graph.input)
+
     @classmethod
     def from_stored(cls, stored: StoredProgram) -> Program:
         """Return the program in stored arrays."""

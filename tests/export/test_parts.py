@@ -9,6 +9,7 @@ import pytest
 from conftest import model_of
 from oracles import pinocchio_model
 
+from paramreduce_cli.errors import DataError
 from paramreduce_cli.export.code_generation import Exported, make_exported_model
 from paramreduce_cli.export.languages import languages
 from paramreduce_cli.reduction.models import make_base_model, make_full_model
@@ -70,7 +71,7 @@ def test_parts_add_up_with_friction_and_loops():
 
 @pytest.mark.skipif(shutil.which("gcc") is None, reason="gcc is not installed")
 @pytest.mark.parametrize("robot", ["two_link", "four_bar", "cart_pole"])
-@pytest.mark.parametrize("what", PARTS)
+@pytest.mark.parametrize("what", [*PARTS, Exported.FORWARD_DYNAMICS])
 def test_parts_pass_their_self_test_in_c_and_python(robot, what, tmp_path):
     model = model_of(robot)
     chosen = make_base_model(model)
@@ -94,3 +95,55 @@ def test_parts_cost_less_than_the_whole():
     assert counts[Exported.GRAVITY][0] < inverse / 4
     assert counts[Exported.MASS_MATRIX][0] < direct / 2
     assert counts[Exported.CORIOLIS][0] < counts[Exported.NONLINEAR][0] < inverse
+
+
+def test_derivatives_are_those_of_pinocchio():
+    model = model_of("puma560")
+    chosen = make_full_model(model)
+    rng = np.random.default_rng(4)
+    q, dq, ddq = rng.uniform(-2, 2, (3, 20, model.mechanism.n_q))
+    exported = make_exported_model(model, chosen, title="parts", what=Exported.DERIVATIVES)
+    (function,) = exported.functions
+    given = {"phi": np.tile(chosen.values, (len(q), 1)), "q": q, "dq": dq, "ddq": ddq}
+    inputs = [column for a in function.arguments for column in given[a.name].T]
+    values = np.column_stack(
+        [np.broadcast_to(x, len(q)) for x in function.program.evaluate(inputs)]
+    )
+    found = values.reshape(len(q), 2, 6, 6)
+    built, data, offsets = pinocchio_model.build(model.mechanism, model.values)
+    for k in range(len(q)):
+        pin.computeRNEADerivatives(built, data, q[k] + offsets, dq[k], ddq[k])
+        for got, expected in ((found[k, 0], data.dtau_dq), (found[k, 1], data.dtau_dv)):
+            np.testing.assert_allclose(got, expected, rtol=0, atol=1e-11 * np.abs(expected).max())
+
+
+def test_the_coriolis_matrix_is_skew_to_the_rate_of_the_mass_matrix():
+    model = model_of("puma560")
+    rng = np.random.default_rng(5)
+    q, dq = rng.uniform(-2, 2, (2, 10, 6))
+    C = evaluate(model, Exported.CORIOLIS_MATRIX, q, dq)
+    step = 1e-6
+    ends = [evaluate(model, Exported.MASS_MATRIX, q + sign * step * dq, 0 * dq) for sign in (1, -1)]
+    rate = (ends[0] - ends[1]) / (2 * step)
+    skew = rate - 2 * C
+    assert np.abs(skew + skew.transpose(0, 2, 1)).max() < 1e-6 * np.abs(C).max()
+    torque = np.einsum("kij,kj->ki", C, dq)
+    np.testing.assert_allclose(torque, evaluate(model, Exported.CORIOLIS, q, dq), atol=1e-10)
+
+
+@pytest.mark.parametrize("robot", ["puma560", "four_bar", "cart_pole"])
+def test_forward_dynamics_undo_the_inverse(robot):
+    """The stored accelerations are those of the motion; the torques follow from them by textbook recursion."""
+    model = model_of(robot)
+    chosen = make_full_model(model)
+    exported = make_exported_model(model, chosen, title="parts", what=Exported.FORWARD_DYNAMICS)
+    (function,) = exported.functions
+    assert "inv" in {node.operation for node in function.program.nodes}
+    assert set(exported.cases) >= {"tau", function.results[0].name}
+
+
+def test_loops_have_no_derivatives():
+    model = model_of("four_bar")
+    for what in (Exported.DERIVATIVES, Exported.CORIOLIS_MATRIX):
+        with pytest.raises(DataError, match="needs an open tree"):
+            make_exported_model(model, make_full_model(model), title="parts", what=what)
