@@ -233,7 +233,7 @@ def test_a_road_from_a_file_is_met_with_delay(invoke, tmp_path):
         ([("{amplitude: 0.02, frequencies: [1.3]}", "{file: short.csv}")], "holds 0 to 1 s"),
         ([("{amplitude: 0.02, frequencies: [1.3]}", "{file: holes.csv}")], "row 3 has a number that is not"),
         ([("speed: {trolley: 2}", "speed: {ground: 2}")], "whose motion is prescribed"),
-        ([("motions: {ground", "motions: {wheel: {}, car: {}, trolley: {}, ground"),
+        ([("motions: {ground", "motions: {wheel: {amplitude: 0}, car: {amplitude: 0}, trolley: {amplitude: 0}, ground"),
           ("    speed: {trolley: 2}\n", "")], "prescribes the motion of all coordinates"),
         ([("ground: {amplitude", "gruond: {amplitude")], "Did you mean ground?"),
         ([("    step: 0.01\n", "    step: 0.01\n    inputs: {ground: {amplitude: 1, frequencies: [1]}}\n")],
