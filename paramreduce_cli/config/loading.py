@@ -329,8 +329,8 @@ def _describe_entry(entry: Any, data: Any, kind: type[Section] = Config) -> Prob
     path = _strip_union_steps(entry["loc"], data, kind)
     owner, key = _find_section(path[:-1], kind, data), path[-1] if path else ""
     if entry["type"] == "extra_forbidden" and owner is not None:
-        told = FORMER_KEYS.get(path) or KEYS_ELSEWHERE.get((path[0], key))
-        return path, told or UnknownNameError("key", str(key), owner.model_fields)
+        advice = FORMER_KEYS.get(path) or KEYS_ELSEWHERE.get((path[0], key))
+        return path, advice or UnknownNameError("key", str(key), owner.model_fields)
     if entry["type"].startswith("union_tag"):
         return _describe_tag(entry, path)
     meaning = ""

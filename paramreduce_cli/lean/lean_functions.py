@@ -127,7 +127,7 @@ class LeanFunctions:
         Raises:
             DataError: The mechanism has closed loops.
         """
-        self._require_tree("coriolis-matrix")
+        self._require_tree("the Coriolis matrix")
         z = self._mechanism.n_dof
         C = Argument("C", (z, z), "matrix of Coriolis and centrifugal torques C dq")
         text = "Coriolis matrix in Christoffel form, so that dM/dt - 2 C is skew."
@@ -145,13 +145,11 @@ class LeanFunctions:
         Raises:
             DataError: The mechanism has closed loops.
         """
-        self._require_tree("derivatives")
+        self._require_tree("the derivative of the torques")
         z = self._mechanism.n_dof
         by_q = Argument("dtau_dq", (z, z), "derivatives of the torques by the coordinates")
         by_dq = Argument("dtau_ddq", (z, z), "derivatives of the torques by the velocities")
-        text = (
-            "Derivatives of the inverse dynamics; those by the accelerations are the mass matrix."
-        )
+        text = "Derivatives of the inverse dynamics; those by the accelerations are the mass matrix. Jumps have none."
         inverse = self.make_inverse()
         graph, outputs = inverse.program.to_graph()
         entries = []
@@ -184,7 +182,7 @@ class LeanFunctions:
         """Raise DataError if the mechanism has loops."""
         if self._mechanism.loops is not None:
             raise DataError(
-                f"--what {what} needs an open tree: with closed loops R and b are arguments, which depend on the coordinates."
+                f"{what} needs an open tree: with closed loops R and b are arguments, which depend on the coordinates."
             )
 
     @staticmethod
