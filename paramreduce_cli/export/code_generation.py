@@ -22,6 +22,7 @@ from paramreduce_cli.export.exported_model import ExportedModel, ParameterValue
 from paramreduce_cli.export.term_sizes import estimate_term_sizes
 from paramreduce_cli.export.validity import describe_ranges, describe_validity
 from paramreduce_cli.expressions.functions import Function
+from paramreduce_cli.lean.dynamics_parts import DynamicsParts
 from paramreduce_cli.lean.lean_functions import LeanFunctions
 from paramreduce_cli.lean.loop_kinematics import LoopKinematics
 from paramreduce_cli.records import (
@@ -67,13 +68,13 @@ _FUNCTIONS = {
     Exported.DDM: (LeanFunctions.make_direct,),
     Exported.BOTH: (LeanFunctions.make_inverse, LeanFunctions.make_direct),
     Exported.REGRESSOR: (LeanFunctions.make_regressor,),
-    Exported.GRAVITY: (LeanFunctions.make_gravity,),
-    Exported.CORIOLIS: (LeanFunctions.make_coriolis,),
-    Exported.NONLINEAR: (LeanFunctions.make_nonlinear,),
-    Exported.MASS_MATRIX: (LeanFunctions.make_mass_matrix,),
-    Exported.CORIOLIS_MATRIX: (LeanFunctions.make_coriolis_matrix,),
-    Exported.DERIVATIVES: (LeanFunctions.make_derivatives,),
-    Exported.FORWARD_DYNAMICS: (LeanFunctions.make_forward_dynamics,),
+    Exported.GRAVITY: (DynamicsParts.make_gravity,),
+    Exported.CORIOLIS: (DynamicsParts.make_coriolis,),
+    Exported.NONLINEAR: (DynamicsParts.make_nonlinear,),
+    Exported.MASS_MATRIX: (DynamicsParts.make_mass_matrix,),
+    Exported.CORIOLIS_MATRIX: (DynamicsParts.make_coriolis_matrix,),
+    Exported.DERIVATIVES: (DynamicsParts.make_derivatives,),
+    Exported.FORWARD_DYNAMICS: (DynamicsParts.make_forward_dynamics,),
 }
 
 
@@ -233,5 +234,5 @@ def make_functions(
         constant: Whether the values of the parameters are part of them.
         simplified: The one function with pruned terms.
     """
-    lean = LeanFunctions(model, chosen, constant=constant, simplified=simplified)
+    lean = DynamicsParts(model, chosen, constant=constant, simplified=simplified)
     return tuple(make(lean) for make in _FUNCTIONS[what])

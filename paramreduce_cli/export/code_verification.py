@@ -9,7 +9,7 @@ import numpy as np
 from paramreduce_cli.export.term_sizes import find_entry_sizes
 from paramreduce_cli.expressions.functions import Function
 from paramreduce_cli.expressions.programs import Program
-from paramreduce_cli.lean.lean_functions import find_inertial_parameters
+from paramreduce_cli.lean.dynamics_parts import find_inertial_parameters
 from paramreduce_cli.lean.lean_verification import TOLERANCE, reject_if_wrong
 from paramreduce_cli.multibody.dynamics import SINGULAR_MASS, Dynamics
 from paramreduce_cli.multibody.loops.coordinates import Coordinates
