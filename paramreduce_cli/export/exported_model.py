@@ -82,7 +82,9 @@ class ExportedModel:
 
 
 _TAKEN = {
+    "jax",
     "numpy",
+    "torch",
     "all",
     "clean",
     "edit_cache",
