@@ -7,7 +7,7 @@ from enum import StrEnum
 import numpy as np
 
 from paramreduce_cli import __version__
-from paramreduce_cli.errors import ParamreduceWarning
+from paramreduce_cli.errors import DataError, ParamreduceWarning
 from paramreduce_cli.export.code_verification import (
     check,
     check_against_mechanism,
@@ -111,6 +111,7 @@ def make_exported_model(
 
     Raises:
         FormulationError: The functions do not compute what the straightforward model does.
+        DataError: Accelerations are asked for, and the mass matrix is not positive definite.
     """
     mechanism = model.mechanism
     report_progress(Progress(_TASK, 0, 2, "functions"))
@@ -127,6 +128,7 @@ def make_exported_model(
     result_names = {result.name for function in functions for result in function.results}
     checked = make_random_cases(mechanism, chosen, _CHECKED, rng, simplified, result_names)
     least = estimate_term_sizes(mechanism, chosen, checked)
+    unsafe = _check_mass_matrices(model, checked, what, title) if simplified is None else ""
     check(functions, checked, least)
     whole = np.array_equal(chosen.standard[model.affecting], model.values[model.affecting])
     if whole and simplified is None:
@@ -134,13 +136,6 @@ def make_exported_model(
     if closures:
         check_closures(closures, checked, least)
         check_loop_problems(problems, least_pivots, checked, least)
-    unsafe = ""
-    # Without some terms M was positive definite wherever it was looked at where that holds; these states may be beyond.
-    if simplified is None and what in _WITH_MASS_MATRIX:
-        massive = find_massive_coordinates(model, checked)
-        unsafe = find_unsafe_mass_matrices(checked["M"][:, massive][:, :, massive])
-    if unsafe:
-        warnings.warn(f"{title}: {unsafe}", ParamreduceWarning, stacklevel=2)
     worth = _describe_accuracy(model, unsafe, simplified, validation)
     if single:
         worth.append(_describe_rounding(functions, checked, least))
@@ -167,6 +162,38 @@ def make_exported_model(
         cases={name: values for name, values in stored.items() if name in used},
         least=least,
     )
+
+
+def _check_mass_matrices(
+    model: Model, stored: Mapping[str, FloatArray], what: Exported, title: str
+) -> str:
+    """Describe on how many states the mass matrix is not positive definite, and warn of them; empty if on none, or if no
+    function needs it.
+
+    With pruned terms M was positive definite wherever these hold; random states may be beyond.
+
+    Raises:
+        DataError: Accelerations are asked for, which need a positive definite mass matrix.
+    """
+    if what not in _WITH_MASS_MATRIX:
+        return ""
+    massive = find_massive_coordinates(model, stored)
+    names = [model.mechanism.generalised_names[k] for k in model.mechanism.independent]
+    massless = [name for k, name in enumerate(names) if k not in massive]
+    unsafe = find_unsafe_mass_matrices(stored["M"][:, massive][:, :, massive])
+    if what is Exported.FORWARD_DYNAMICS and massless:
+        raise DataError(
+            f"{what}: {', '.join(massless)} moves no mass, so that forces determine no acceleration there. "
+            f"Export {Exported.DDM}, and solve for the other accelerations."
+        )
+    if what is Exported.FORWARD_DYNAMICS and unsafe:
+        raise DataError(
+            f"{what}: it needs a positive definite M, and of {title} {unsafe}. Choose a model that is selected by "
+            "accelerations, such as one of swap@acceleration, or full."
+        )
+    if unsafe:
+        warnings.warn(f"{title}: {unsafe}", ParamreduceWarning, stacklevel=3)
+    return unsafe
 
 
 def _describe_accuracy(

@@ -3,6 +3,8 @@
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
+import numpy as np
+
 from paramreduce_cli.expressions.functions import Argument, Function
 from paramreduce_cli.expressions.graph import Node
 
@@ -20,6 +22,8 @@ class Language:
     """Function that writes a constant."""
     element: Callable[[Argument, int], str]
     """An element of an array, by its position row by row."""
+    one: str = "1"
+    """The number one as a dividend."""
 
     def write_leaves(self, function: Function) -> dict[int, str]:
         """Return the texts of constants and inputs, by node."""
@@ -39,7 +43,7 @@ class Language:
             [write_signed(names, value) for value in node.operands],
         )
         if operation == "inv":
-            return f"1 / {names[node.operands[0] >> 1]}"
+            return f"{self.one} / {names[node.operands[0] >> 1]}"
         if operation in self.calls:
             return f"{self.calls[operation]}({', '.join(operands)})"
         a, b = operands
@@ -60,3 +64,14 @@ class Language:
 def write_signed(names: Mapping[int, str], value: int) -> str:
     """Return a signed reference as text."""
     return f"-{names[value >> 1]}" if value & 1 else names[value >> 1]
+
+
+def write_float(value: float, *, single: bool) -> str:
+    """Return a number with a point or an exponent; with ``single``, numbers too small for single precision are zero.
+
+    Compilers warn of numbers that single precision is too coarse for.
+    """
+    if single and np.float32(value) == 0:
+        value = 0.0
+    text = repr(float(value))
+    return text if any(mark in text for mark in ".en") else f"{text}.0"

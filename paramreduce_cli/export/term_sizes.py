@@ -13,6 +13,7 @@ from paramreduce_cli.records import INERTIAL, FloatArray, Kind, Mechanism, Reduc
 _SHARE = 1e-3
 """Share of the bound of all terms that a result is taken for at least; bounds are far from being reached."""
 _SMALLEST = 1e-300
+_EPSILON = float(np.finfo(float).eps)
 
 
 def estimate_term_sizes(
@@ -55,8 +56,19 @@ def estimate_term_sizes(
         "Phi_d": reach,
     }
     least = {name: max(_SHARE * sizes.get(name, 1.0), _SMALLEST) for name in {*stored, *sizes}}
+    least["ddz" if "ddz" in stored else "ddq"] = _estimate_solution_size(stored)
     # The bias b is added to the accelerations that the independent coordinates bring.
     return {**least, "b": max(float(np.abs(stored["ddq"]).max()), _SMALLEST)}
+
+
+def _estimate_solution_size(stored: Mapping[str, FloatArray]) -> float:
+    """Return the largest acceleration that the torques of a state could bring, by the least eigenvalue of its M: the
+    rounding errors of the torques bring accelerations in the same ratio.
+    """
+    eigenvalues = np.abs(np.linalg.eigvalsh(stored["M"]))
+    smallest = np.maximum(eigenvalues.min(axis=1), _EPSILON * eigenvalues.max(axis=1))
+    torques = np.linalg.norm(stored["tau"], axis=1) + np.linalg.norm(stored["delta"], axis=1)
+    return max(float((torques / np.maximum(smallest, _SMALLEST)).max()), _SMALLEST)
 
 
 def _assign_by_kind(mechanism: Mechanism, mass: float, moment: float, inertia: float) -> FloatArray:

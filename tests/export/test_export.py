@@ -399,7 +399,7 @@ def test_the_command_exports_the_selected_model(invoke, two_link_results, tmp_pa
     [
         (["--model", "swap:99"], "--model swap:99: there is full, base, "),
         (["--model", "nobody"], "--model nobody: there is full"),
-        (["--single", "--format", "python"], "--single needs --format c"),
+        (["--single", "--format", "python"], "--single needs --format c or --format rust"),
         (["--results", "nowhere"], "nowhere/model.h5"),
         (["--set", "description.gravity=[0,0,-1]"], "was made with another description section"),
     ],

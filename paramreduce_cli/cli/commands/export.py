@@ -44,6 +44,8 @@ _FUNCTIONS = {str(Exported.IDM): "inverse", str(Exported.DDM): "direct"}
 """What one function alone is called."""
 LEANEST = "leanest"
 """The model of whichever function is asked for that has it with the fewest operations."""
+_WITH_PRECISION = ("c", "rust")
+"""Languages whose code has a precision of its own."""
 _OF_ONE = (TERMS, LEANEST)
 """Models of one function alone."""
 _OF_A_ROBOT = (FULL, BASE, IDENTIFIED, CONSISTENT, *_OF_ONE)
@@ -69,7 +71,7 @@ _OF_A_ROBOT = (FULL, BASE, IDENTIFIED, CONSISTENT, *_OF_ONE)
     help="Model to export: HEURISTIC:N, full or base; with a log also identified or consistent; terms (one function with pruned terms); leanest (fewest operations within the limits of selected and terms).  [default: the selected model]",
 )
 @click.option("--constants", is_flag=True, help="Write the values of the parameters into the code.")
-@click.option("--single", is_flag=True, help="Use single precision (C only).")
+@click.option("--single", is_flag=True, help="Use single precision (C and Rust).")
 @click.option(
     "-o", "--output", type=click.Path(path_type=Path, file_okay=False), metavar="DIR",
     help="[default: RESULTS/export/FORMAT]",
@@ -100,8 +102,8 @@ def export(
         raise click.UsageError(
             f"Code and robots' files need a CONFIG. Without a CONFIG only --format {VALUES} works."
         )
-    if single and kind != "c":
-        raise click.UsageError("--single needs --format c.")
+    if single and kind not in _WITH_PRECISION:
+        raise click.UsageError(f"--single needs --format {' or --format '.join(_WITH_PRECISION)}.")
     if kind in (*formats, VALUES) and (what != Exported.BOTH or constants) and text not in _OF_ONE:
         raise click.UsageError(f"--what and --constants apply to code, not to --format {kind}.")
     if text in _OF_ONE and kind in formats:

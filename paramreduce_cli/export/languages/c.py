@@ -1,13 +1,13 @@
 """C99, with a face for C++17: headers, a source, a self-test, an example, and what builds them."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from paramreduce_cli.export.exported_model import ExportedModel, write_header
-from paramreduce_cli.export.expressions import FUNCTIONS, Language, write_signed
+from paramreduce_cli.export.expressions import FUNCTIONS, Language, write_float, write_signed
+from paramreduce_cli.export.grouped_sines import COSINE, SINE, find_dependence, group_sines
 from paramreduce_cli.export.sines import DOUBLE, SINGLE, write_polynomial
 from paramreduce_cli.export.template_rendering import render_template
 from paramreduce_cli.expressions.functions import Argument, Function
@@ -101,7 +101,7 @@ class _Writer:
             "stack": self.estimate_stack(),
             "signs": any("sign" in f.program.operations for f in model.functions),
             "angles": any(
-                _find_dependence(f).angles
+                find_dependence(f).angles
                 for f in (*model.functions, *model.closures, *model.loop_problems)
             ),
             "sines": self.write_sine_constants(),
@@ -114,11 +114,7 @@ class _Writer:
 
     def write_number(self, value: float) -> str:
         """Return a number as text, in the precision of the code."""
-        if self._model.single and np.float32(value) == 0:
-            value = 0.0  # compilers warn of numbers that single precision is too coarse for
-        text = repr(float(value))
-        text = text if any(mark in text for mark in ".en") else f"{text}.0"
-        return f"{text}{self._suffix}"
+        return f"{write_float(value, single=self._model.single)}{self._suffix}"
 
     def write_function(self, function: Function) -> dict[str, object]:
         """Return the texts of a function for one state and for many."""
@@ -194,33 +190,20 @@ class _Writer:
 
     def write_statements(self, function: Function) -> list[str]:
         """Return the body, one operation a line; sines and cosines of all angles at once."""
-        language = self._make_language(batched=False)
-        names = language.write_leaves(function)
-        found = _find_dependence(function)
-        rows = {angle: row for row, angle in enumerate(found.angles)}
-        before: list[str] = []
-        rest: list[str] = []
-        for number, node in function.iterate_steps():
-            if number in found.waves:
-                row = rows[node.operands[0] >> 1]
-                names[number] = f"{'sine' if node.operation == 'sin' else 'cosine'}[{row}]"
-                continue
-            text = f"const {self._real} t{number} = {language.write_expression(names, node)};"
-            names[number] = f"t{number}"
-            (before if number in found.before else rest).append(text)
-        if rows:
-            count = len(rows)
-            angles = ", ".join(names[angle] for angle in rows)
-            before.append(f"{self._real} angles[{count}] = {{{angles}}};")
-            before.append(f"{self._real} sine[{count}], cosine[{count}];")
-            before.append(f"sines({count}, angles, sine, cosine);")
-        positions = zip(
-            function.list_positions(function.results), function.program.outputs, strict=True
-        )
-        outputs = [
-            f"{array.name}[{k}] = {write_signed(names, value)};" for (array, k), value in positions
-        ]
-        return [*before, *rest, *outputs]
+        body = group_sines(function, self._make_language(batched=False))
+
+        def declare(steps: Sequence[tuple[str, str]]) -> list[str]:
+            """Return the lines of operations."""
+            return [f"const {self._real} {name} = {text};" for name, text in steps]
+
+        lines = declare(body.before)
+        if count := len(body.angles):
+            lines.append(f"{self._real} angles[{count}] = {{{', '.join(body.angles)}}};")
+            lines.append(f"{self._real} {SINE}[{count}], {COSINE}[{count}];")
+            lines.append(f"sines({count}, angles, {SINE}, {COSINE});")
+        positions = function.list_positions(function.results)
+        results = zip(positions, body.outputs, strict=True)
+        return [*lines, *declare(body.after), *(f"{a.name}[{k}] = {text};" for (a, k), text in results)]  # fmt: skip
 
     @property
     def _real(self) -> str:
@@ -247,7 +230,7 @@ class _Writer:
         program = function.program
         language = self._make_language(batched=True)
         names = language.write_leaves(function)
-        found = _find_dependence(function)
+        found = find_dependence(function)
         rows = {angle: row for row, angle in enumerate(found.angles)}
         once: list[str] = []
         before: list[str] = []
@@ -300,40 +283,3 @@ class _Writer:
             }
             for name, values in self._model.cases.items()
         }
-
-
-@dataclass(frozen=True)
-class _Dependence:
-    """A record of which nodes of a function depend on parameters alone, and which on states."""
-
-    states: list[bool]
-    """Whether each node depends on the state, and not on parameters alone."""
-    waves: set[int]
-    """Sines and cosines of what depends on the state, taken all at once."""
-    angles: list[int]
-    """Nodes whose sines or cosines are taken, each once."""
-    before: set[int]
-    """Operations that the angles are made of."""
-    rest: set[int]
-    """Nodes that the results consist of, besides sines and cosines."""
-
-
-def _find_dependence(function: Function) -> _Dependence:
-    """Find which nodes the sines need, and which nodes depend on parameters alone."""
-    nodes, states = function.program.nodes, function.find_state_dependent()
-    waves: set[int] = set()
-    before: set[int] = set()
-    rest = {value >> 1 for value in function.program.outputs}
-    for number in range(len(nodes) - 1, -1, -1):
-        below = {value >> 1 for value in nodes[number].operands}
-        wave = nodes[number].operation in ("sin", "cos") and states[number]
-        if wave and number not in before:
-            waves.add(number)
-        if wave or number in before:
-            before |= below
-        if number in rest and number not in waves:
-            rest |= below
-    operations = {number for number, _ in function.iterate_steps()}
-    waves &= operations
-    angles = dict.fromkeys(nodes[number].operands[0] >> 1 for number in sorted(waves))
-    return _Dependence(states, waves, list(angles), before & operations, rest)
