@@ -10,7 +10,7 @@ PAPER := puma560 hexaglide
 MEASURED := tx40 ur10 panda
 SMALL := two_link four_bar five_bar rssr delta humanoid_leg cart_pole quarter_car puma560_friction
 
-.PHONY: docs serve help all campaign $(PAPER) $(PAPER:%=%-terms) $(SMALL) $(MEASURED) test check format sweep test-cluster test-pythons regression optimiser reference benchmark robots identification controllers pages torture graph clean
+.PHONY: docs serve help all campaign $(PAPER) $(PAPER:%=%-terms) $(SMALL) $(MEASURED) test check format sweep test-cluster test-pythons regression optimiser reference benchmark robots identification controllers parts learning pages torture graph clean
 .DEFAULT_GOAL := help
 
 help:
@@ -32,6 +32,8 @@ help:
 	@echo "make pages       reports in a browser: sizes and times"
 	@echo "make identification  intervals and hints on simulated logs"
 	@echo "make controllers     rest-to-rest trajectories of two arms, checked"
+	@echo "make parts       parts of the dynamics beside urdf2casadi's and Pinocchio's"
+	@echo "make learning    JAX and PyTorch modules beside MuJoCo MJX and adam-robotics"
 	@echo "make docs        build the site, and run what it tells to type"
 	@echo "make serve       the site, to read in a browser"
 	@echo "make test-pythons  the small case with every other Python from 3.11 to 3.13"
@@ -50,6 +52,12 @@ $(VENV)/.installed: pyproject.toml
 
 $(VENV)/.installed-dev: $(VENV)/.installed
 	$(BIN)/pip install --quiet --disable-pip-version-check --editable '.[dev]'
+	@$(SMALLER)
+	@touch $@
+
+# Exported modules for JAX and PyTorch are tested where these are installed.
+$(VENV)/.installed-learning: $(VENV)/.installed
+	$(BIN)/pip install --quiet --disable-pip-version-check --editable '.[learning]'
 	@$(SMALLER)
 	@touch $@
 
@@ -148,7 +156,7 @@ campaign: regression optimiser docs test-pythons
 	$(MAKE) torture
 	$(MAKE) test-cluster
 
-benchmark robots identification controllers pages: export PYTHONPATH := tests
+benchmark robots identification controllers parts pages: export PYTHONPATH := tests
 benchmark: $(VENV)/.installed-dev
 	$(BIN)/pip install --quiet --disable-pip-version-check --editable '.[dev,benchmark]'
 	$(BIN)/python -m tests.benchmarks
@@ -170,6 +178,20 @@ identification: $(VENV)/.installed-dev
 # Rest-to-rest trajectories of two arms against limits of torque and distance.
 controllers: $(VENV)/.installed-dev
 	$(BIN)/python -m tests.benchmarks.controllers
+
+# urdf2casadi asks for a CasADi of 2020, but runs with today's.
+parts: $(VENV)/.installed-dev
+	$(BIN)/pip install --quiet --disable-pip-version-check --editable '.[dev,benchmark]'
+	$(BIN)/pip install --quiet --disable-pip-version-check --no-deps 'urdf2casadi==1.2.0' 'urdf-parser-py==0.0.4'
+	$(BIN)/python -m tests.benchmarks.dynamics_parts
+
+# adam-robotics asks for an older JAX, which MJX is faster with too.
+PEERS := .venv-peers
+learning: $(VENV)/.installed
+	$(PYTHON) -m venv $(PEERS)
+	$(PEERS)/bin/pip install --quiet --disable-pip-version-check 'torch>=2.4,<2.14'
+	$(PEERS)/bin/pip install --quiet --disable-pip-version-check --editable '.[learning]' 'adam-robotics[jax,pytorch]==0.5.0' 'mujoco-mjx==3.17.0' 'example-robot-data>=6,<7'
+	$(PEERS)/bin/python -m tests.benchmarks.learning
 
 # The site into site/, with warnings as errors; then every command and snippet of the tutorial and its
 # neighbours from a wheel in an empty folder, also for another interpreter: DOCS="--python python3.13".

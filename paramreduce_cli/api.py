@@ -20,7 +20,7 @@ from paramreduce_cli.config import Config
 from paramreduce_cli.config import load_config as loaded_config
 from paramreduce_cli.config.schema import Settings
 from paramreduce_cli.errors import DataError, ParamreduceError
-from paramreduce_cli.export.code_generation import make_exported_model
+from paramreduce_cli.export.code_generation import Exported, make_exported_model
 from paramreduce_cli.export.languages import languages
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.records import (
@@ -245,7 +245,9 @@ def code(
     parameters: ReducedModel,
     language: str = "c",
     *,
+    what: str | Sequence[str] = "both",
     title: str = "",
+    name: str = "",
     constant: bool = False,
     single: bool = False,
     validation: Validation | None = None,
@@ -255,18 +257,22 @@ def code(
     Args:
         model: Model of the robot.
         parameters: Model from :func:`chosen`, :func:`full_model` or :func:`base_model`.
-        language: Language: c, casadi, latex, matlab or python.
+        language: Language: c, casadi, fmu, jax, latex, matlab, python, rust or torch.
+        what: Functions, one or several of those that ``paramreduce export --what`` lists.
         title: Title of the model in the files; the number of its parameters if empty.
+        name: Name that files and functions begin with; the robot's if empty.
         constant: Whether the values are part of the code.
-        single: Whether numbers have single precision, in C.
+        single: Whether numbers have single precision, in C and Rust.
         validation: Validation, for the ranges of motion in the header.
 
     Raises:
         KeyError: The language is unknown; the message lists all languages.
+        ValueError: There is no such function.
         ParamreduceError: The functions differ from textbook recursion.
     """
+    kinds = [Exported(kind) for kind in ([what] if isinstance(what, str) else what)]
     exported = make_exported_model(
-        model, parameters, title=title or f"{parameters.n} parameters",
+        model, parameters, title=title or f"{parameters.n} parameters", what=kinds, name=name,
         constant=constant, single=single, origin="from Python", validation=validation,
     )  # fmt: skip
     files: dict[str, bytes] = languages[language](exported)

@@ -1,7 +1,7 @@
 """A reduced model with all that its code says, checked before it is written in some language."""
 
 import warnings
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from enum import StrEnum
 
 import numpy as np
@@ -86,7 +86,8 @@ def make_exported_model(
     chosen: ReducedModel,
     *,
     title: str,
-    what: Exported = Exported.BOTH,
+    what: Exported | Sequence[Exported] = Exported.BOTH,
+    name: str = "",
     constant: bool = False,
     single: bool = False,
     origin: str = "",
@@ -100,7 +101,8 @@ def make_exported_model(
         model: Model of the robot.
         chosen: Reduced model to export, with expressions.
         title: Title of the model.
-        what: Functions to export.
+        what: Functions to export, one kind or several.
+        name: Name that files and functions begin with; the robot's if empty.
         constant: Whether the values of the parameters are part of the code.
         single: Whether numbers have single precision.
         origin: Artifact that the model is from, for the comment that opens every file.
@@ -128,7 +130,9 @@ def make_exported_model(
     result_names = {result.name for function in functions for result in function.results}
     checked = make_random_cases(mechanism, chosen, _CHECKED, rng, simplified, result_names)
     least = estimate_term_sizes(mechanism, chosen, checked)
-    unsafe = _check_mass_matrices(model, checked, what, title) if simplified is None else ""
+    unsafe = (
+        _check_mass_matrices(model, checked, _list_kinds(what), title) if simplified is None else ""
+    )
     check(functions, checked, least)
     whole = np.array_equal(chosen.standard[model.affecting], model.values[model.affecting])
     if whole and simplified is None:
@@ -145,12 +149,13 @@ def make_exported_model(
     stored = make_random_cases(mechanism, chosen, _CASES, rng, simplified, result_names)
     report_progress(Progress(_TASK, 2, 2))
     return ExportedModel(
-        robot=mechanism.robot,
+        robot=name or mechanism.robot,
         heading=(f"{mechanism.robot}: {title}.", *worth, *_describe_origin(mechanism, origin)),
         frames=_describe_frames(mechanism),
         coordinates=mechanism.generalised_names,
         units=tuple(body.unit for body in mechanism.bodies),
         independent=np.array(mechanism.independent, dtype=np.int64),
+        start=np.zeros(mechanism.n_q) if mechanism.loops is None else mechanism.loops.assembly,
         parameters=_list_values(model, chosen),
         symbols=mechanism.symbols,
         constant=constant,
@@ -165,7 +170,7 @@ def make_exported_model(
 
 
 def _check_mass_matrices(
-    model: Model, stored: Mapping[str, FloatArray], what: Exported, title: str
+    model: Model, stored: Mapping[str, FloatArray], kinds: Sequence[Exported], title: str
 ) -> str:
     """Describe on how many states the mass matrix is not positive definite, and warn of them; empty if on none, or if no
     function needs it.
@@ -175,20 +180,20 @@ def _check_mass_matrices(
     Raises:
         DataError: Accelerations are asked for, which need a positive definite mass matrix.
     """
-    if what not in _WITH_MASS_MATRIX:
+    if not set(kinds) & set(_WITH_MASS_MATRIX):
         return ""
     massive = find_massive_coordinates(model, stored)
     names = [model.mechanism.generalised_names[k] for k in model.mechanism.independent]
     massless = [name for k, name in enumerate(names) if k not in massive]
     unsafe = find_unsafe_mass_matrices(stored["M"][:, massive][:, :, massive])
-    if what is Exported.FORWARD_DYNAMICS and massless:
+    if Exported.FORWARD_DYNAMICS in kinds and massless:
         raise DataError(
-            f"{what}: {', '.join(massless)} moves no mass, so that forces determine no acceleration there. "
+            f"{Exported.FORWARD_DYNAMICS}: {', '.join(massless)} moves no mass, so that forces determine no acceleration there. "
             f"Export {Exported.DDM}, and solve for the other accelerations."
         )
-    if what is Exported.FORWARD_DYNAMICS and unsafe:
+    if Exported.FORWARD_DYNAMICS in kinds and unsafe:
         raise DataError(
-            f"{what}: it needs a positive definite M, and of {title} {unsafe}. Choose a model that is selected by "
+            f"{Exported.FORWARD_DYNAMICS}: it needs a positive definite M, and of {title} {unsafe}. Choose a model that is selected by "
             "accelerations, such as one of swap@acceleration, or full."
         )
     if unsafe:
@@ -247,7 +252,7 @@ def _list_values(model: Model, chosen: ReducedModel) -> tuple[ParameterValue, ..
 def make_functions(
     model: Model,
     chosen: ReducedModel,
-    what: Exported,
+    what: Exported | Sequence[Exported],
     *,
     constant: bool = False,
     simplified: TermModel | None = None,
@@ -257,9 +262,15 @@ def make_functions(
     Args:
         model: Model of the robot.
         chosen: Reduced model.
-        what: Functions to return.
+        what: Functions to return, one kind or several.
         constant: Whether the values of the parameters are part of them.
         simplified: The one function with pruned terms.
     """
     lean = DynamicsParts(model, chosen, constant=constant, simplified=simplified)
-    return tuple(make(lean) for make in _FUNCTIONS[what])
+    makers = [make for kind in _list_kinds(what) for make in _FUNCTIONS[kind]]
+    return tuple(make(lean) for make in dict.fromkeys(makers))
+
+
+def _list_kinds(what: Exported | Sequence[Exported]) -> tuple[Exported, ...]:
+    """Return kinds of functions as a tuple, whether one or several are given."""
+    return (what,) if isinstance(what, Exported) else tuple(what)

@@ -36,6 +36,8 @@ class ExportedModel:
     """Unit of each coordinate, rad or m."""
     independent: IntArray
     """Positions of the independent coordinates, (n_dof,)."""
+    start: FloatArray
+    """Coordinates from which loops are closed; zero in open trees, (n_q,)."""
     parameters: tuple[ParameterValue, ...]
     symbols: Mapping[str, str]
     """Formulas of names in the expressions, for LaTeX."""

@@ -5,6 +5,7 @@ torque error of at most 1 % and 0.1 % on both sets, their operations and nanosec
 those of Pinocchio's recursion on the same arm.
 """
 
+import hashlib
 import os
 import shutil
 import subprocess
@@ -18,7 +19,7 @@ import numpy as np
 import pinocchio as pin
 
 from paramreduce_cli.config import load_config
-from tests.benchmarks.lean_code import DEFINITIONS, DYNAMIC, headers
+from tests.benchmarks import lean_code
 
 ROOT = Path(__file__).parents[2]
 WHEEL = next(Path(sys.prefix).rglob("share/example-robot-data/robots"), Path())
@@ -82,33 +83,41 @@ def nanoseconds(folder, name, n):
 
 @cache
 def peer():
-    """Pinocchio's inverse dynamics as a program, compiled as lean_code.py compiles it."""
-    program = FOLDER / "peer"
-    includes = [f"-I{path}" for path in headers()]
-    defined = [f"-D{one}" for one in DEFINITIONS]
-    source = str(Path(__file__).with_suffix(".cpp"))
-    command = ["g++", "-std=c++17", "-w", "-DNDEBUG", *FLAGS[:2], *defined, *includes, source]
-    subprocess.run([*command, "-o", str(program)], check=True)
+    """Pinocchio's algorithms as a program, compiled as lean_code.py compiles them, and kept in the user's cache."""
+    source = Path(__file__).with_suffix(".cpp")
+    version = pin.__version__.encode()
+    digest = hashlib.sha256(source.read_bytes() + version).hexdigest()
+    program = lean_code.cache() / f"pinocchio-{digest[:16]}"
+    if program.exists():
+        return program
+    program.parent.mkdir(parents=True, exist_ok=True)
+    includes = [f"-I{path}" for path in lean_code.headers()]
+    defined = [f"-D{one}" for one in lean_code.DEFINITIONS]
+    command = ["g++", "-std=c++17", "-w", "-DNDEBUG", *FLAGS[:2], *defined, *includes, str(source)]
+    building = program.with_suffix(".building")
+    subprocess.run([*command, "-o", str(building)], check=True)
+    building.rename(program)
     return program
 
 
-def pinocchio_nanoseconds(config):
-    """Of one evaluation by Pinocchio, the least of many turns; all joints turn about z."""
-    robot = load_config(config)
-    mechanism, phi = robot.build_mechanism(), robot.get_values()
+def time_pinocchio(mechanism, phi):
+    """Nanoseconds of one evaluation by name of Pinocchio's function, the least of many; all joints turn about z."""
     lines = [str(mechanism.n_q)]
     for rigid in mechanism.rigid:
         body = mechanism.bodies[rigid.body]
         above = np.eye(4) if body.parent < 0 else mechanism.bodies[body.parent].joint_to_body
         placed = above @ body.parent_to_joint
-        own = pin.Inertia.FromDynamicParameters(phi[[rigid.columns[kind] for kind in DYNAMIC]])
+        own = pin.Inertia.FromDynamicParameters(
+            phi[[rigid.columns[kind] for kind in lean_code.DYNAMIC]]
+        )
         inertia = own.se3Action(pin.SE3(body.joint_to_body)).toDynamicParameters()
         numbers = [*placed[:3, :3].ravel(), *placed[:3, 3], *inertia]
         lines.append(f"{body.parent + 1} z {' '.join(repr(float(x)) for x in numbers)}")
     done = subprocess.run(
         [peer()], input="\n".join(lines), capture_output=True, text=True, check=True
     )
-    return float(done.stdout.split()[0])
+    rows = (line.split(maxsplit=1) for line in done.stdout.splitlines())
+    return {name: float(nanoseconds) for nanoseconds, name in rows}
 
 
 def cells(label, file, options):
@@ -157,7 +166,9 @@ def cells(label, file, options):
                 test = 100 * file_[f"{heuristic}/torque_error_test"][kept - 1]
                 errors += f" / {np.median(test):.2g} % ({test.min():.2g} to {test.max():.2g})"
         rows.append((tolerance, kept, base, errors, operations, nanoseconds(code, name, n)))
-    return minutes, rows, pinocchio_nanoseconds(config)
+    robot = load_config(config)
+    theirs = time_pinocchio(robot.build_mechanism(), robot.get_values())["rnea"]
+    return minutes, rows, theirs
 
 
 def main():

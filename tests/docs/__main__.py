@@ -140,7 +140,7 @@ def installed(folder, interpreter):
     (source,) = (folder / "source").glob("*.tar.gz")
     call(*pip, "wheel", "--no-deps", "--wheel-dir", folder / "wheel", source)
     (wheel,) = (folder / "wheel").glob("*.whl")
-    extra = ("nbclient>=0.10,<1", "ipykernel>=6.29,<8")
+    extra = ("nbclient>=0.10,<1", "ipykernel>=6.29,<8", "fmpy>=0.3.20,<0.4")
     call(*pip, "install", f"{wheel}[pandas,identify]", *extra)
     path = f"{python.parent}:{os.environ['PATH']}"
     return {**kept, "PATH": path, "MPLBACKEND": "agg", "BROWSER": "true %s"}

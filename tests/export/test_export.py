@@ -384,7 +384,9 @@ def test_names_cannot_reach_the_code():
 def test_every_exporter_gives_files(model, kind):
     files = files_of(model, kind, "idm", "base")
     assert files
-    assert all(name.startswith((model.mechanism.robot, "Makefile", "CMake")) for name in files)
+    assert all(
+        name.startswith((model.mechanism.robot, "Makefile", "CMake", "Cargo")) for name in files
+    )
 
 
 def test_the_command_exports_the_selected_model(invoke, two_link_results, tmp_path):

@@ -61,8 +61,8 @@ _OF_A_ROBOT = (FULL, BASE, IDENTIFIED, CONSISTENT, *_OF_ONE)
     help="Language of the code. urdf and mjcf write the robot's own file with the model's parameters, values writes JSON.",
 )  # fmt: skip
 @click.option(
-    "--what", type=click.Choice([str(what) for what in Exported]), default="both", show_default=True,
-    help="Function to export: inverse dynamics (idm), direct dynamics [M | delta] (ddm), both, the regressor, or a part: torques at rest (gravity), Coriolis torques C dz, all torques without acceleration (nonlinear), M (mass-matrix), C in Christoffel form (coriolis-matrix), derivatives of the inverse dynamics (derivatives), accelerations (forward-dynamics).",
+    "--what", type=click.Choice([str(what) for what in Exported]), multiple=True, default=["both"], show_default=True,
+    help="Function to export; give it several times for several in one file: inverse dynamics (idm), direct dynamics [M | delta] (ddm), both, the regressor, or a part: torques at rest (gravity), Coriolis torques C dz, all torques without acceleration (nonlinear), M (mass-matrix), C in Christoffel form (coriolis-matrix), derivatives of the inverse dynamics (derivatives), accelerations (forward-dynamics).",
 )  # fmt: skip
 @click.option(
     "--model",
@@ -71,6 +71,7 @@ _OF_A_ROBOT = (FULL, BASE, IDENTIFIED, CONSISTENT, *_OF_ONE)
     help="Model to export: HEURISTIC:N, full or base; with a log also identified or consistent; terms (one function with pruned terms); leanest (fewest operations within the limits of selected and terms).  [default: the selected model]",
 )
 @click.option("--constants", is_flag=True, help="Write the values of the parameters into the code.")
+@click.option("--name", default="", help="Name that files and functions begin with.  [default: that of the robot]")  # fmt: skip
 @click.option("--single", is_flag=True, help="Use single precision (C and Rust).")
 @click.option(
     "-o", "--output", type=click.Path(path_type=Path, file_okay=False), metavar="DIR",
@@ -83,9 +84,10 @@ def export(
     results: Path | None,
     overrides: tuple[str, ...],
     kind: str,
-    what: str,
+    what: tuple[str, ...],
     text: str | None,
     constants: bool,
+    name: str,
     single: bool,
     output: Path | None,
 ) -> None:
@@ -104,20 +106,27 @@ def export(
         )
     if single and kind not in _WITH_PRECISION:
         raise click.UsageError(f"--single needs --format {' or --format '.join(_WITH_PRECISION)}.")
-    if kind in (*formats, VALUES) and (what != Exported.BOTH or constants) and text not in _OF_ONE:
-        raise click.UsageError(f"--what and --constants apply to code, not to --format {kind}.")
+    if (
+        kind in (*formats, VALUES)
+        and (what != (Exported.BOTH,) or constants or name)
+        and text not in _OF_ONE
+    ):
+        raise click.UsageError(
+            f"--what, --constants and --name apply to code, not to --format {kind}."
+        )
     if text in _OF_ONE and kind in formats:
         raise click.UsageError(
             f"--model {text}: these values are valid for one function only, not for a robot's file. "
             f"Write code, or use --format {VALUES}."
         )
-    if text in _OF_ONE and what not in _FUNCTIONS:
+    single_function = _FUNCTIONS.get(what[0], "") if len(what) == 1 else ""
+    if text in _OF_ONE and not single_function:
         raise click.UsageError(
             f"--model {text}: each function has its own values. Add --what {' or --what '.join(_FUNCTIONS)}."
         )
     if text == LEANEST:
         assert loaded is not None
-        text = _find_leanest(loaded, store, _FUNCTIONS[what])
+        text = _find_leanest(loaded, store, single_function)
     records: list[type] = [] if loaded is None else [Model]
     if text == TERMS:
         records.append(TermReduction)
@@ -131,7 +140,7 @@ def export(
             loading[Validation] = load_current(loaded, store, Validation)
     simplified = None
     if text == TERMS:
-        chosen, simplified, title = find_pruned_model(loading[TermReduction], _FUNCTIONS[what])
+        chosen, simplified, title = find_pruned_model(loading[TermReduction], single_function)
     else:
         chosen, title = find_chosen_model(
             text,
@@ -157,7 +166,8 @@ def export(
                 loading[Model],
                 chosen,
                 title=title,
-                what=Exported(what),
+                what=[Exported(function) for function in what],
+                name=name,
                 constant=constants,
                 single=single,
                 simplified=simplified,
