@@ -10,7 +10,7 @@ PAPER := puma560 hexaglide
 MEASURED := tx40 ur10 panda
 SMALL := two_link four_bar five_bar rssr delta humanoid_leg cart_pole quarter_car puma560_friction
 
-.PHONY: docs serve help all campaign $(PAPER) $(PAPER:%=%-terms) $(SMALL) $(MEASURED) test check format sweep test-cluster test-pythons regression optimiser reference benchmark robots identification controllers parts learning pages torture graph clean
+.PHONY: docs serve help all campaign $(PAPER) $(PAPER:%=%-terms) $(SMALL) $(MEASURED) test check format sweep test-cluster test-pythons regression optimiser reference benchmark robots identification controllers parts widths learning pages torture graph clean
 .DEFAULT_GOAL := help
 
 help:
@@ -33,6 +33,7 @@ help:
 	@echo "make identification  intervals and hints on simulated logs"
 	@echo "make controllers     rest-to-rest trajectories of two arms, checked"
 	@echo "make parts       parts of the dynamics beside urdf2casadi's and Pinocchio's"
+	@echo "make widths      exported C by width of the processor's vectors"
 	@echo "make learning    JAX and PyTorch modules beside MuJoCo MJX and adam-robotics"
 	@echo "make docs        build the site, and run what it tells to type"
 	@echo "make serve       the site, to read in a browser"
@@ -156,7 +157,7 @@ campaign: regression optimiser docs test-pythons
 	$(MAKE) torture
 	$(MAKE) test-cluster
 
-benchmark robots identification controllers parts pages: export PYTHONPATH := tests
+benchmark robots identification controllers parts widths pages: export PYTHONPATH := tests
 benchmark: $(VENV)/.installed-dev
 	$(BIN)/pip install --quiet --disable-pip-version-check --editable '.[dev,benchmark]'
 	$(BIN)/python -m tests.benchmarks
@@ -184,6 +185,9 @@ parts: $(VENV)/.installed-dev
 	$(BIN)/pip install --quiet --disable-pip-version-check --editable '.[dev,benchmark]'
 	$(BIN)/pip install --quiet --disable-pip-version-check --no-deps 'urdf2casadi==1.2.0' 'urdf-parser-py==0.0.4'
 	$(BIN)/python -m tests.benchmarks.dynamics_parts
+
+widths: $(VENV)/.installed-dev
+	$(BIN)/python -m tests.benchmarks.vector_widths
 
 # adam-robotics asks for an older JAX, which MJX is faster with too.
 PEERS := .venv-peers

@@ -20,7 +20,7 @@ from paramreduce_cli.config import Config
 from paramreduce_cli.config import load_config as loaded_config
 from paramreduce_cli.config.schema import Settings
 from paramreduce_cli.errors import DataError, ParamreduceError
-from paramreduce_cli.export.code_generation import Exported, make_exported_model
+from paramreduce_cli.export.code_generation import Exported, adapt_kinds, make_exported_model
 from paramreduce_cli.export.languages import languages
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.records import (
@@ -272,7 +272,7 @@ def code(
     """
     kinds = [Exported(kind) for kind in ([what] if isinstance(what, str) else what)]
     exported = make_exported_model(
-        model, parameters, title=title or f"{parameters.n} parameters", what=kinds, name=name,
+        model, parameters, title=title or f"{parameters.n} parameters", what=adapt_kinds(kinds, language), name=name,
         constant=constant, single=single, origin="from Python", validation=validation,
     )  # fmt: skip
     files: dict[str, bytes] = languages[language](exported)

@@ -76,8 +76,8 @@ def test_unknown_names_are_answered_with_those_there_are(two_link_results):
         results.validation.heuristics["bset"]
     with pytest.raises(KeyError, match=r"qr has no model with 99 parameters\. Choose from: 1, 2"):
         pr.chosen(results.reduction, "qr", 99)
-    with pytest.raises(KeyError, match=r"unknown language 'rust'\. Choose from: c, casadi"):
-        pr.code(results.model, pr.base_model(results.model), "rust")
+    with pytest.raises(KeyError, match=r"unknown language 'fortran'\. Choose from: c, casadi"):
+        pr.code(results.model, pr.base_model(results.model), "fortran")
 
 
 def test_the_package_has_the_name_of_its_project():

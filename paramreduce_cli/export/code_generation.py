@@ -78,6 +78,11 @@ _FUNCTIONS = {
 }
 
 
+_SIMULATED = {
+    Exported.DDM: (Exported.FORWARD_DYNAMICS,),
+    Exported.BOTH: (Exported.IDM, Exported.FORWARD_DYNAMICS),
+}
+"""Functions of units that simulate, by what they are in other languages."""
 _WITH_MASS_MATRIX = (Exported.DDM, Exported.BOTH, Exported.MASS_MATRIX, Exported.FORWARD_DYNAMICS)
 
 
@@ -185,11 +190,16 @@ def _check_mass_matrices(
     massive = find_massive_coordinates(model, stored)
     names = [model.mechanism.generalised_names[k] for k in model.mechanism.independent]
     massless = [name for k, name in enumerate(names) if k not in massive]
+    if Exported.FORWARD_DYNAMICS in kinds and model.unmeasured:
+        raise DataError(
+            f"{Exported.FORWARD_DYNAMICS}: the torques of {', '.join(model.unmeasured)} were not measured, so that the mass "
+            f"matrix is not known there. Export {Exported.IDM}."
+        )
     unsafe = find_unsafe_mass_matrices(stored["M"][:, massive][:, :, massive])
     if Exported.FORWARD_DYNAMICS in kinds and massless:
         raise DataError(
             f"{Exported.FORWARD_DYNAMICS}: {', '.join(massless)} moves no mass, so that forces determine no acceleration there. "
-            f"Export {Exported.DDM}, and solve for the other accelerations."
+            f"Export {Exported.IDM}, or {Exported.DDM} in a language other than fmu, and solve for the other accelerations."
         )
     if Exported.FORWARD_DYNAMICS in kinds and unsafe:
         raise DataError(
@@ -269,6 +279,19 @@ def make_functions(
     lean = DynamicsParts(model, chosen, constant=constant, simplified=simplified)
     makers = [make for kind in _list_kinds(what) for make in _FUNCTIONS[kind]]
     return tuple(make(lean) for make in dict.fromkeys(makers))
+
+
+def adapt_kinds(what: Exported | Sequence[Exported], language: str) -> tuple[Exported, ...]:
+    """Return the functions to export in a language; units of FMI simulate the direct model, for which they need accelerations.
+
+    Args:
+        what: Functions that are asked for, one kind or several.
+        language: Name of the language.
+    """
+    kinds = _list_kinds(what)
+    if language != "fmu":
+        return kinds
+    return tuple(simulated for kind in kinds for simulated in _SIMULATED.get(kind, (kind,)))
 
 
 def _list_kinds(what: Exported | Sequence[Exported]) -> tuple[Exported, ...]:

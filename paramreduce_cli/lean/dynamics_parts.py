@@ -98,7 +98,20 @@ class DynamicsParts(LeanFunctions):
 
     def make_forward_dynamics(self) -> Function:
         """Return the function that gives the accelerations of the independent coordinates under given torques."""
-        return derive_forward_dynamics(self.make_direct())
+        direct = self.make_direct()
+        z = direct.results[1].size
+        name = "ddz" if any(argument.name == "R" for argument in direct.arguments) else "ddq"
+        result = Argument(name, (z,), "accelerations of the independent coordinates")
+        tau = Argument("tau", (z,), "torques or forces, N m or N")
+        text = "Accelerations under given torques, by a Cholesky factorisation of the mass matrix."
+        graph, outputs = direct.program.to_graph()
+        first = sum(argument.size for argument in direct.arguments)
+        M = [outputs[i * z : (i + 1) * z] for i in range(z)]
+        left = [graph.subtract(graph.input(first + i), outputs[z * z + i]) for i in range(z)]
+        program = Program.from_graph(
+            *minimise_operations([Values(graph, solve_symmetric(graph, M, left))])
+        )
+        return Function("forward_dynamics", text, (*direct.arguments, tau), (result,), program)
 
     def _require_tree(self, what: str) -> None:
         """Raise DataError if the mechanism has loops."""
@@ -170,27 +183,6 @@ class DynamicsParts(LeanFunctions):
         n, start = self._mechanism.n_q, self._models.n_parameters
         place = ("q", "dq", "ddq").index(name)
         return range(start + place * n, start + (place + 1) * n)
-
-
-def derive_forward_dynamics(direct: Function) -> Function:
-    """Return the function that gives the accelerations of the independent coordinates under given torques.
-
-    Args:
-        direct: Function that gives the mass matrix, which must be positive definite, and the bias.
-    """
-    z = direct.results[1].size
-    name = "ddz" if any(argument.name == "R" for argument in direct.arguments) else "ddq"
-    result = Argument(name, (z,), "accelerations of the independent coordinates")
-    tau = Argument("tau", (z,), "torques or forces, N m or N")
-    text = "Accelerations under given torques, by a Cholesky factorisation of the mass matrix."
-    graph, outputs = direct.program.to_graph()
-    first = sum(argument.size for argument in direct.arguments)
-    M = [outputs[i * z : (i + 1) * z] for i in range(z)]
-    left = [graph.subtract(graph.input(first + i), outputs[z * z + i]) for i in range(z)]
-    program = Program.from_graph(
-        *minimise_operations([Values(graph, solve_symmetric(graph, M, left))])
-    )
-    return Function("forward_dynamics", text, (*direct.arguments, tau), (result,), program)
 
 
 def find_inertial_parameters(mechanism: Mechanism) -> BoolArray:

@@ -23,13 +23,14 @@ ARMS = {
 
 
 def write_plain_urdf(label, folder):
-    """Return the path of the arm's URDF without meshes, fingers that move and friction, and the names of its joints."""
+    """Return the path of the arm's URDF without meshes, fingers and friction, and the names of its joints."""
     text = (WHEEL / ARMS[label][0]).read_text()
     for kind in ("visual", "collision", "transmission", "gazebo"):
         text = re.sub(rf"<{kind}\b.*?</{kind}>", "", text, flags=re.DOTALL)
     text = re.sub(r"<(safety_controller|mimic)\b[^>]*>", "", text)
     text = re.sub(r"<dynamics\b[^>]*>", "", text)
-    text = text.replace('type="prismatic"', 'type="fixed"')
+    for kind in ("link", "joint"):
+        text = re.sub(rf'<{kind} name="panda_\w*finger\w*".*?</{kind}>', "", text, flags=re.DOTALL)
     path = folder / f"{label}.urdf"
     path.write_text(text)
     return path, re.findall(r'<joint name="([^"]+)" type="(?:revolute|continuous)"', text)

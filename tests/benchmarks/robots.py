@@ -1,8 +1,8 @@
 """Robots that people have, from their files to code: how small and how fast models of them are.
 
 Run as a module it writes results/robots/robots.md: for each arm the full model, the smallest with a
-torque error of at most 1 % and 0.1 % on both sets, their operations and nanoseconds a state in C, and
-those of Pinocchio's recursion on the same arm.
+torque error of at most 1 % and 0.1 % on both sets, the first also with negligible terms removed, their operations and
+nanoseconds a state in C with constant parameters, and those of Pinocchio's recursion on the same arm.
 """
 
 import hashlib
@@ -20,6 +20,7 @@ import pinocchio as pin
 
 from paramreduce_cli.config import load_config
 from tests.benchmarks import lean_code
+from tests.benchmarks.vector_widths import time_code
 
 ROOT = Path(__file__).parents[2]
 WHEEL = next(Path(sys.prefix).rglob("share/example-robot-data/robots"), Path())
@@ -36,31 +37,6 @@ FOLDER = ROOT / "results" / "robots"
 TOLERANCES = (0.01, 0.001)
 FLAGS = ("-O3", "-march=native", "-ffp-contract=fast", "-std=gnu99")
 
-DRIVER = """
-#include "{name}.h"
-#include <stdio.h>
-#include <time.h>
-int main(void) {{
-  double phi[{name}_n_parameters], q[{n}], dq[{n}], ddq[{n}], tau[{n}], sum = 0, least = 1e9;
-  {name}_parameters(phi);
-  for (int i = 0; i < {n}; ++i) {{ q[i] = 0.3 + 0.1 * i; dq[i] = 0.2 * i - 0.5; ddq[i] = 0.7 - 0.3 * i; }}
-  for (int turn = 0; turn < 60; ++turn) {{
-    struct timespec a, b;
-    clock_gettime(CLOCK_MONOTONIC, &a);
-    for (int k = 0; k < 20000; ++k) {{
-      q[k % {n}] += 1e-6;
-      {name}_inverse_dynamics(phi, q, dq, ddq, tau);
-      sum += tau[k % {n}];
-    }}
-    clock_gettime(CLOCK_MONOTONIC, &b);
-    const double spent = ((b.tv_sec - a.tv_sec) * 1e9 + (b.tv_nsec - a.tv_nsec)) / 20000;
-    if (spent < least) least = spent;
-  }}
-  printf("%.1f %g\\n", least, sum);
-  return 0;
-}}
-"""
-
 
 def paramreduce(*arguments):
     command = [sys.executable, "-m", "paramreduce_cli", *map(str, arguments)]
@@ -68,17 +44,6 @@ def paramreduce(*arguments):
     if done.returncode not in (0, 1):
         raise RuntimeError(done.stdout + done.stderr)
     return done.stdout
-
-
-def nanoseconds(folder, name, n):
-    """Of one evaluation of the exported inverse dynamics, the least of many turns."""
-    (folder / "time.c").write_text(DRIVER.format(name=name, n=n))
-    subprocess.run(["gcc", *FLAGS, "-o", "t", "time.c", f"{name}.c", "-lm"], cwd=folder, check=True)
-    return float(
-        subprocess.run(
-            ["./t"], cwd=folder, capture_output=True, text=True, check=True
-        ).stdout.split()[0]
-    )
 
 
 @cache
@@ -121,51 +86,48 @@ def time_pinocchio(mechanism, phi):
 
 
 def cells(label, file, options):
-    """Rows of the table: what is said of the full model and of each tolerance."""
+    """Return the minutes of the run, what is said of the full model and of each tolerance, and Pinocchio's nanoseconds."""
     config, results = FOLDER / f"{label}.yaml", FOLDER / label
     config.unlink(missing_ok=True)
     shutil.rmtree(results, ignore_errors=True)
     paramreduce("init", file, *options, "--output", config)
+    here = (config, "--results", results, "--set", "validation.accept={}")
     started = time.perf_counter()
-    paramreduce("run", config, "--results", results, "--set", "validation.accept={}")
+    paramreduce("run", *here)
     minutes = (time.perf_counter() - started) / 60
-    rows = []
-    for tolerance in (None, *TOLERANCES):
-        if tolerance is None:
-            settings, model = ("--set", "validation.accept={}"), ("--model", "full")
-        else:
-            settings = (
-                "--set",
-                "validation.accept={}",
-                "--set",
-                f"selected.torque_error={tolerance}",
+    with h5py.File(results / "model.h5") as model_file:
+        n, base = len(model_file["coordinates/names"]), model_file["base/columns"].size
+        affecting = int(model_file["parameters/affecting"][()].sum())
+
+    def export_and_time(name, *more):
+        """Return the operations of an exported function, and its nanoseconds for one state and in batches."""
+        code = FOLDER / f"{label}-{name}"
+        paramreduce("export", *here, "--what", "idm", "--constants", "--output", code, *more)
+        stem = next(path.stem for path in code.glob("*.hpp"))
+        text = "Torques of the independent coordinates for a motion. "
+        operations = int((code / f"{stem}.h").read_text().split(text)[1].split()[0])
+        return operations, *time_code(code, stem, n, ["-march=native"])
+
+    rows = [("full", affecting, base, "", *export_and_time("full", "--model", "full"))]
+    for tolerance in TOLERANCES:
+        asked = ("--set", f"selected.torque_error={tolerance}")
+        paramreduce("validate", *here, *asked)
+        with h5py.File(results / "validation.h5") as file_:
+            kept = int(file_["selected/n"][()])
+            heuristic = file_["selected/heuristic"][()].decode()
+            errors = " / ".join(
+                f"{100 * file_[f'{heuristic}/torque_error_{name}'][kept - 1]:.2g} %"
+                for name in ("estimation", "validation")
             )
-            model = ()
-            paramreduce("validate", config, "--results", results, *settings)
-        code = FOLDER / f"{label}-{tolerance}"
-        paramreduce("export", config, "--results", results, *settings, *model, "--output", code)
-        name = next(path.stem for path in code.glob("*.hpp"))
-        header = (code / f"{name}.h").read_text()
-        operations = int(
-            header.split("Torques of the independent coordinates for a motion. ")[1].split()[0]
-        )
-        with h5py.File(results / "model.h5") as model_file:
-            n, base = len(model_file["coordinates/names"]), model_file["base/columns"].size
-            affecting = int(model_file["parameters/affecting"][()].sum())
-        kept, errors = affecting, ""
-        if tolerance is not None:
-            with h5py.File(results / "validation.h5") as file_:
-                kept, heuristic = (
-                    int(file_["selected/n"][()]),
-                    file_["selected/heuristic"][()].decode(),
-                )
-                errors = " / ".join(
-                    f"{100 * file_[f'{heuristic}/torque_error_{name_}'][kept - 1]:.2g} %"
-                    for name_ in ("estimation", "validation")
-                )
-                test = 100 * file_[f"{heuristic}/torque_error_test"][kept - 1]
-                errors += f" / {np.median(test):.2g} % ({test.min():.2g} to {test.max():.2g})"
-        rows.append((tolerance, kept, base, errors, operations, nanoseconds(code, name, n)))
+            test = 100 * file_[f"{heuristic}/torque_error_test"][kept - 1]
+            errors += f" / {np.median(test):.2g} % ({test.min():.2g} to {test.max():.2g})"
+        shown = f"≤ {100 * tolerance:g} %"
+        rows.append((shown, kept, base, errors, *export_and_time(tolerance, *asked)))
+        if tolerance == TOLERANCES[0]:
+            asked += ("--set", f"terms.torque_error={tolerance}")
+            paramreduce("reduce-terms", *here, *asked)
+            terms = export_and_time("terms", *asked, "--model", "terms")
+            rows.append((f"{shown}, terms removed", kept, base, "", *terms))
     robot = load_config(config)
     theirs = time_pinocchio(robot.build_mechanism(), robot.get_values())["rnea"]
     return minutes, rows, theirs
@@ -174,22 +136,23 @@ def cells(label, file, options):
 def main():
     FOLDER.mkdir(parents=True, exist_ok=True)
     lines = [
-        "| robot | model | parameters | ε_τ, estimation / validation / test, median (range) | operations of d | ns | Pinocchio, ns |",
-        "| --- | --- | --- | --- | --- | --- | --- |",
+        "| robot | model | parameters | ε_τ, estimation / validation / test, median (range) | operations of d | ns, one state | ns, batches | Pinocchio, ns |",
+        "| --- | --- | --- | --- | --- | --- | --- | --- |",
     ]
     for label, (file, options) in ROBOTS.items():
         if not file.is_file():
-            lines.append(f"| {label} | its file is not here | | | | | |")
+            lines.append(f"| {label} | its file is not here | | | | | | |")
             continue
         minutes, rows, theirs = cells(label, file, options)
-        for tolerance, kept, base, errors, operations, ns in rows:
-            what = "full" if tolerance is None else f"≤ {100 * tolerance:g} %"
-            first = (
-                f"{label}, {base} base parameters, {minutes:.1f} min" if tolerance is None else ""
-            )
-            beside = f"{theirs:.0f}" if tolerance is None else ""
+        for what, kept, base, errors, operations, single, batched in rows:
+            first, beside = "", ""
+            if what == "full":
+                first, beside = (
+                    f"{label}, {base} base parameters, {minutes:.1f} min",
+                    f"{theirs:.0f}",
+                )
             lines.append(
-                f"| {first} | {what} | {kept} | {errors} | {operations} | {ns:.0f} | {beside} |"
+                f"| {first} | {what} | {kept} | {errors} | {operations} | {single:.0f} | {batched:.0f} | {beside} |"
             )
         print(*lines[-len(rows) :], sep="\n", flush=True)
     (FOLDER / "robots.md").write_text("\n".join(lines) + "\n", encoding="utf-8")

@@ -396,6 +396,23 @@ def test_the_command_exports_the_selected_model(invoke, two_link_results, tmp_pa
     assert (tmp_path / "code" / "two_link.py").exists()
 
 
+def test_several_functions_come_in_one_file_under_a_name(invoke, two_link_results, tmp_path):
+    command = ("export", TWO_LINK, "--results", two_link_results, "--format", "c")
+    functions = ("--what", "gravity", "--what", "both", "--what", "idm", "--what", "mass-matrix")
+    invoke(*command, *functions, "--name", "my arm", "--output", tmp_path)
+    header = (tmp_path / "my_arm.h").read_text()
+    declared = re.findall(r"^void my_arm_(\w+)\(", header, re.MULTILINE)
+    functions = [name for name in declared if not name.endswith("_batch")]
+    assert functions == [
+        "parameters",
+        "gravity",
+        "inverse_dynamics",
+        "direct_dynamics",
+        "mass_matrix",
+    ]
+    subprocess.run(["make", "test"], cwd=tmp_path, check=True, capture_output=True)
+
+
 @pytest.mark.parametrize(
     ("options", "message"),
     [

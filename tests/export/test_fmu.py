@@ -1,5 +1,6 @@
 """Exported units of FMI 3.0, run by FMPy: against Pinocchio's accelerations, stored results and the balance of energy."""
 
+import dataclasses
 import shutil
 import subprocess
 import zipfile
@@ -13,7 +14,7 @@ from oracles.lagrange import Lagrange
 from scipy.integrate import solve_ivp
 
 from paramreduce_cli.errors import DataError, ParamreduceWarning
-from paramreduce_cli.export.code_generation import Exported, make_exported_model
+from paramreduce_cli.export.code_generation import Exported, adapt_kinds, make_exported_model
 from paramreduce_cli.export.languages import fmu as units
 from paramreduce_cli.multibody.loops.coordinates import Coordinates
 from paramreduce_cli.reduction.models import make_full_model
@@ -29,7 +30,8 @@ needs_gcc = pytest.mark.skipif(shutil.which("gcc") is None, reason="gcc is not i
 def write_units(folder, robot, what=Exported.BOTH, **options):
     """Write the units of a model, and return the exported model."""
     model = model_of(robot)
-    exported = make_exported_model(model, make_full_model(model), title="x", what=what, **options)
+    kinds = adapt_kinds(what, "fmu")
+    exported = make_exported_model(model, make_full_model(model), title="x", what=kinds, **options)
     for name, content in units.fmu(exported).items():
         (folder / name).write_bytes(content)
     return exported
@@ -191,11 +193,18 @@ def test_what_cannot_be_done_is_an_error_of_the_unit(tmp_path):
         inverse.get("tau")
 
 
-def test_massless_coordinates_are_not_simulated():
-    model = model_of("wishbone")
-    for what in (Exported.FORWARD_DYNAMICS, Exported.BOTH):
-        with pytest.raises(DataError, match=r"moves no mass|needs a positive definite mass matrix"):
-            units.fmu(make_exported_model(model, make_full_model(model), title="x", what=what))
+@pytest.mark.parametrize("what", [Exported.FORWARD_DYNAMICS, Exported.BOTH, Exported.DDM])
+def test_massless_coordinates_are_not_simulated(tmp_path, what):
+    with pytest.raises(DataError, match="forward-dynamics: road moves no mass"):
+        write_units(tmp_path, "wishbone", what)
+
+
+def test_unmeasured_torques_are_not_simulated():
+    model = dataclasses.replace(model_of("two_link"), nominal_torque=np.array([20, np.inf]))
+    with pytest.raises(DataError, match="the torques of z_fore were not measured"):
+        make_exported_model(
+            model, make_full_model(model), title="x", what=Exported.FORWARD_DYNAMICS
+        )
 
 
 def test_without_a_compiler_a_unit_holds_its_source(tmp_path, monkeypatch):

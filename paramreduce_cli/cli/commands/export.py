@@ -14,7 +14,7 @@ from paramreduce_cli.cli.options import OPTIONAL_CONFIG, RESULTS, SET, make_stor
 from paramreduce_cli.cli.terminal import LOG, VERBOSE, say, show_progress
 from paramreduce_cli.config import Config, load_config
 from paramreduce_cli.errors import ArtifactError, ConfigError
-from paramreduce_cli.export.code_generation import Exported, make_exported_model
+from paramreduce_cli.export.code_generation import Exported, adapt_kinds, make_exported_model
 from paramreduce_cli.export.languages import languages
 from paramreduce_cli.export.named_models import (
     BASE,
@@ -122,7 +122,7 @@ def export(
     single_function = _FUNCTIONS.get(what[0], "") if len(what) == 1 else ""
     if text in _OF_ONE and not single_function:
         raise click.UsageError(
-            f"--model {text}: each function has its own values. Add --what {' or --what '.join(_FUNCTIONS)}."
+            f"--model {text}: each function has its own values. Give one: --what {' or --what '.join(_FUNCTIONS)}."
         )
     if text == LEANEST:
         assert loaded is not None
@@ -166,7 +166,7 @@ def export(
                 loading[Model],
                 chosen,
                 title=title,
-                what=[Exported(function) for function in what],
+                what=adapt_kinds([Exported(function) for function in what], kind),
                 name=name,
                 constant=constants,
                 single=single,

@@ -14,15 +14,12 @@ from math import prod
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from paramreduce_cli.errors import DataError, ParamreduceWarning
+from paramreduce_cli.errors import ParamreduceWarning
 from paramreduce_cli.export.exported_model import ExportedModel, make_harmless
 from paramreduce_cli.export.languages.c import write_scalar_source
 from paramreduce_cli.export.template_rendering import render_template
 from paramreduce_cli.expressions.compiled import find_compiler
 from paramreduce_cli.expressions.functions import Function
-from paramreduce_cli.lean.dynamics_parts import derive_forward_dynamics
 
 _FLAGS = ("-std=c99", "-O2", "-fPIC", "-shared", "-fvisibility=hidden")
 _FIRST_DATE = (1980, 1, 1, 0, 0, 0)
@@ -95,32 +92,14 @@ class _Variable:
 
 
 def fmu(model: ExportedModel) -> dict[str, bytes]:
-    """Write a unit of FMI 3.0 for each function, with its source and a binary for this machine.
-
-    The direct model becomes a unit that simulates the motion under given torques.
-
-    Raises:
-        DataError: The direct model has a singular mass matrix.
+    """Write a unit of FMI 3.0 for each function, with its source and a binary for this machine; forward dynamics are
+    simulated.
     """
     files = {}
     for function in model.functions:
         name = f"{model.name}_{function.name}"
-        if function.name == "direct_dynamics":
-            _require_definite_mass_matrix(model)
-            function = derive_forward_dynamics(function)
-            name = f"{model.name}_forward_dynamics"
         files[f"{name}.fmu"] = _write_unit(model, function, name)
     return files
-
-
-def _require_definite_mass_matrix(model: ExportedModel) -> None:
-    """Raise DataError if the mass matrix is singular or indefinite in a case of the self-test."""
-    smallest = np.linalg.eigvalsh(model.cases["M"])[:, 0]
-    if not (smallest > 0).all():
-        raise DataError(
-            "a simulation needs a positive definite mass matrix, and that of this model is not on random states. "
-            "Export --what idm, or a model that is selected by accelerations."
-        )
 
 
 def _write_unit(model: ExportedModel, function: Function, name: str) -> bytes:
@@ -131,7 +110,7 @@ def _write_unit(model: ExportedModel, function: Function, name: str) -> bytes:
     context: dict[str, Any] = {
         "unit": name,
         "name": model.name,
-        "about": make_harmless(f"{model.heading[0]} {function.text}"),
+        "about": make_harmless(" ".join([*model.heading, function.text])),
         "text": function.text,
         "function": function.name,
         "variables": shown,
