@@ -14,7 +14,7 @@ from paramreduce_cli.records import FloatArray
 
 @dataclass(frozen=True)
 class ArrayLibrary:
-    """A Python library of arrays, as far as exported modules differ by it."""
+    """The settings of one array library for exported modules."""
 
     prefix: str
     """Name that the library is imported as."""

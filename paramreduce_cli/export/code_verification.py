@@ -68,7 +68,7 @@ def make_random_cases(
         "c": weightless.compute_mass_matrix_and_bias(q, dq, inertial)[1],
         "K": K @ expansion,
     }
-    if {"C", "dtau_dq", "dtau_ddq"} & set(result_names):
+    if {"C", "tau_by_q", "tau_by_dq"} & set(result_names):
         result |= compute_derivatives(mechanism, phi, q, dq, ddq)
     if mechanism.loops is None:
         return result | _evaluate_pruned(simplified, result, np.eye(mechanism.n_q)[None])

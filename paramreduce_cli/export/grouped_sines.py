@@ -31,13 +31,13 @@ def group_sines(function: Function, language: Language) -> GroupedBody:
     before: list[tuple[str, str]] = []
     after: list[tuple[str, str]] = []
     for number, node in function.iterate_steps():
-        if number in dependence.waves:
+        if number in dependence.sine_nodes:
             row = rows[node.operands[0] >> 1]
             names[number] = f"{SINE if node.operation == 'sin' else COSINE}[{row}]"
             continue
         text = language.write_expression(names, node)
         names[number] = f"t{number}"
-        (before if number in dependence.before else after).append((names[number], text))
+        (before if number in dependence.angle_operations else after).append((names[number], text))
     outputs = [write_signed(names, value) for value in function.program.outputs]
     return GroupedBody(before, [names[angle] for angle in rows], after, outputs)
 
@@ -46,34 +46,34 @@ def group_sines(function: Function, language: Language) -> GroupedBody:
 class Dependence:
     """A record of which nodes of a function depend on parameters alone, and which on states."""
 
-    states: list[bool]
+    state_dependent: list[bool]
     """Whether each node depends on the state, and not on parameters alone."""
-    waves: set[int]
+    sine_nodes: set[int]
     """Sines and cosines of what depends on the state, taken all at once."""
     angles: list[int]
     """Nodes whose sines or cosines are taken, each once."""
-    before: set[int]
+    angle_operations: set[int]
     """Operations that the angles are made of."""
-    rest: set[int]
+    output_nodes: set[int]
     """Nodes that the results consist of, besides sines and cosines."""
 
 
 def find_dependence(function: Function) -> Dependence:
     """Find which nodes the sines need, and which nodes depend on parameters alone."""
-    nodes, states = function.program.nodes, function.find_state_dependent()
-    waves: set[int] = set()
-    before: set[int] = set()
-    rest = {value >> 1 for value in function.program.outputs}
+    nodes, state_dependent = function.program.nodes, function.find_state_dependent()
+    sine_nodes: set[int] = set()
+    of_angles: set[int] = set()
+    of_outputs = {value >> 1 for value in function.program.outputs}
     for number in range(len(nodes) - 1, -1, -1):
-        below = {value >> 1 for value in nodes[number].operands}
-        wave = nodes[number].operation in ("sin", "cos") and states[number]
-        if wave and number not in before:
-            waves.add(number)
-        if wave or number in before:
-            before |= below
-        if number in rest and number not in waves:
-            rest |= below
+        operands = {value >> 1 for value in nodes[number].operands}
+        is_sine = nodes[number].operation in ("sin", "cos") and state_dependent[number]
+        if is_sine and number not in of_angles:
+            sine_nodes.add(number)
+        if is_sine or number in of_angles:
+            of_angles |= operands
+        if number in of_outputs and number not in sine_nodes:
+            of_outputs |= operands
     operations = {number for number, _ in function.iterate_steps()}
-    waves &= operations
-    angles = dict.fromkeys(nodes[number].operands[0] >> 1 for number in sorted(waves))
-    return Dependence(states, waves, list(angles), before & operations, rest)
+    sine_nodes &= operations
+    angles = dict.fromkeys(nodes[number].operands[0] >> 1 for number in sorted(sine_nodes))
+    return Dependence(state_dependent, sine_nodes, list(angles), of_angles & operations, of_outputs)

@@ -82,9 +82,9 @@ class DynamicsParts(LeanFunctions):
         """
         self._require_tree("the derivative of the torques")
         z = self._mechanism.n_dof
-        by_q = Argument("dtau_dq", (z, z), "derivatives of the torques by the coordinates")
-        by_dq = Argument("dtau_ddq", (z, z), "derivatives of the torques by the velocities")
-        text = "Derivatives of the inverse dynamics; those by the accelerations are the mass matrix. Jumps have none."
+        by_q = Argument("tau_by_q", (z, z), "derivatives of the torques by the coordinates")
+        by_dq = Argument("tau_by_dq", (z, z), "derivatives of the torques by the velocities")
+        text = "Derivatives of the inverse dynamics; those by the accelerations are the mass matrix. At a jump of friction they are those beside it."
         inverse = self.make_inverse()
         graph, outputs = inverse.program.to_graph()
         entries = []
@@ -103,7 +103,7 @@ class DynamicsParts(LeanFunctions):
         name = "ddz" if any(argument.name == "R" for argument in direct.arguments) else "ddq"
         result = Argument(name, (z,), "accelerations of the independent coordinates")
         tau = Argument("tau", (z,), "torques or forces, N m or N")
-        text = "Accelerations under given torques, by a Cholesky factorisation of the mass matrix."
+        text = "Accelerations under given torques, by a factorisation L D L' of the mass matrix."
         graph, outputs = direct.program.to_graph()
         first = sum(argument.size for argument in direct.arguments)
         M = [outputs[i * z : (i + 1) * z] for i in range(z)]

@@ -20,7 +20,7 @@ def compute_derivatives(
         ddq: Accelerations, same shape.
 
     Returns:
-        By name, (n_states, n_q, n_q) each: ``dtau_dq`` and ``dtau_ddq``, and ``C`` of Christoffel symbols of the first kind.
+        By name, (n_states, n_q, n_q) each: ``tau_by_q`` and ``tau_by_dq``, and ``C`` of Christoffel symbols of the first kind.
     """
     n = mechanism.n_q
     position, speed, acceleration = (ca.SX.sym(name, n) for name in ("q", "dq", "ddq"))
@@ -43,5 +43,5 @@ def compute_derivatives(
     results = [
         [np.array(part) for part in function(*state)] for state in zip(q, dq, ddq, strict=True)
     ]
-    names = ("dtau_dq", "dtau_ddq", "C")
+    names = ("tau_by_q", "tau_by_dq", "C")
     return {name: np.array([one[k] for one in results]) for k, name in enumerate(names)}

@@ -230,23 +230,23 @@ class _Writer:
         program = function.program
         language = self._make_language(batched=True)
         names = language.write_leaves(function)
-        found = find_dependence(function)
-        rows = {angle: row for row, angle in enumerate(found.angles)}
+        dependence = find_dependence(function)
+        rows = {angle: row for row, angle in enumerate(dependence.angles)}
         once: list[str] = []
         before: list[str] = []
         rest: list[str] = []
         for number, node in function.iterate_steps():
-            if number in found.waves:
+            if number in dependence.sine_nodes:
                 names[number] = f"{node.operation}_{rows[node.operands[0] >> 1]}[k]"
                 continue
-            if number not in found.rest:
+            if number not in dependence.output_nodes:
                 continue
             text = f"const {self._real} t{number} = {language.write_expression(names, node)};"
             names[number] = f"t{number}"
-            (rest if found.states[number] else once).append(text)
+            (rest if dependence.state_dependent[number] else once).append(text)
         angle_names = language.write_leaves(function)
         for number, node in function.iterate_steps():
-            if number in found.before:
+            if number in dependence.angle_operations:
                 text = f"const {self._real} a{number} = {language.write_expression(angle_names, node)};"
                 angle_names[number] = f"a{number}"
                 before.append(text)

@@ -1,4 +1,4 @@
-"""Functional mock-up units of FMI 3.0, one a function: the direct model is simulated, other functions are computed."""
+"""Functional mock-up units of FMI 3.0, one unit per function: forward dynamics are simulated, other functions computed."""
 
 import io
 import platform
@@ -71,7 +71,7 @@ _UNSUPPORTED = {
     ],
     "ActivateModelPartition": [("fmi3ValueReference", ""), ("fmi3Float64", "")],
 }  # fmt: skip
-"""Functions of the standard that no unit has, with types and brackets of their arguments after the instance."""
+"""Functions of the standard that every unit answers with an error, with types and brackets of their arguments after the instance."""
 
 
 @dataclass(frozen=True)
@@ -186,7 +186,7 @@ def _list_variables(
 
 
 def _number_variables(variables: Sequence[_Variable]) -> list[dict[str, Any]]:
-    """Return what the templates say of each variable, with its value reference and its place among all values."""
+    """Return the variables as dictionaries for the templates, with value references and offsets among all values."""
     references = {v.name: k for k, v in enumerate(variables)}
     first, numbered = 0, []
     for v in variables:
@@ -206,7 +206,7 @@ def _number_variables(variables: Sequence[_Variable]) -> list[dict[str, Any]]:
 
 
 def _list_loop_arguments(variables: Sequence[_Variable]) -> list[str]:
-    """Return z, dz and ddz in the call that closes the loops; what a unit does not have, or computes, is zero there."""
+    """Return the arguments for z, dz and ddz in the call that closes the loops; those that are absent or computed are zero."""
     given = {v.name for v in variables if v.causality == "input" or v.state}
     return [f"V_{name}" if name in given else "zero" for name in ("z", "dz", "ddz")]
 

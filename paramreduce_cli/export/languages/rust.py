@@ -1,4 +1,4 @@
-"""A Rust crate without the standard library: a manifest, a source and a self-test."""
+"""A Rust crate, without the standard library where its functions allow: a manifest, a source and a self-test."""
 
 from collections.abc import Mapping, Sequence
 from functools import cached_property
@@ -14,7 +14,7 @@ from paramreduce_cli.expressions.functions import Argument, Function
 
 
 def rust(model: ExportedModel) -> dict[str, bytes]:
-    """Write a crate without allocation, in f64 or f32; models with more functions than sines need std."""
+    """Write a crate without allocation, in f64 or f32; functions other than sin, cos and sign need std."""
     context = _Writer(model).make_context()
     templates = {
         "Cargo.toml": "Cargo.toml",

@@ -10,7 +10,7 @@ _TORCH = ArrayLibrary(
     opening="torch_opening.py",
     closures="torch_closures.py",
     notes=(
-        "Functions are differentiable by states and parameters; torch.compile makes them several times faster.",
+        "Functions are differentiable by states and parameters; torch.compile makes them two to five times faster.",
         "Tensors may have leading axes for many states; the last axis, or the last two of a matrix, are those of one",
         "state. The results have the precision and the device of the states.",
     ),
