@@ -59,6 +59,7 @@ class Exported(StrEnum):
     NONLINEAR = "nonlinear"
     MASS_MATRIX = "mass-matrix"
     CORIOLIS_MATRIX = "coriolis-matrix"
+    MOMENTUM = "momentum"
     DERIVATIVES = "derivatives"
     FORWARD_DYNAMICS = "forward-dynamics"
 
@@ -73,6 +74,7 @@ _FUNCTIONS = {
     Exported.NONLINEAR: (DynamicsParts.make_nonlinear,),
     Exported.MASS_MATRIX: (DynamicsParts.make_mass_matrix,),
     Exported.CORIOLIS_MATRIX: (DynamicsParts.make_coriolis_matrix,),
+    Exported.MOMENTUM: (DynamicsParts.make_momentum,),
     Exported.DERIVATIVES: (DynamicsParts.make_derivatives,),
     Exported.FORWARD_DYNAMICS: (DynamicsParts.make_forward_dynamics,),
 }

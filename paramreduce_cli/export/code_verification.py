@@ -68,8 +68,12 @@ def make_random_cases(
         "c": weightless.compute_mass_matrix_and_bias(q, dq, inertial)[1],
         "K": K @ expansion,
     }
-    if {"C", "tau_by_q", "tau_by_dq"} & set(result_names):
+    if {"C", "beta", "tau_by_q", "tau_by_dq"} & set(result_names):
         result |= compute_derivatives(mechanism, phi, q, dq, ddq)
+    if "beta" in result_names:
+        result["p"] = np.einsum("kij,kj->ki", M, dq)
+        across = np.einsum("kji,kj->ki", result["C"], dq)
+        result["beta"] = across - delta + result["c"]
     if mechanism.loops is None:
         return result | _evaluate_pruned(simplified, result, np.eye(mechanism.n_q)[None])
     dependent, independent = list(mechanism.dependent), list(mechanism.independent)

@@ -46,6 +46,8 @@ def estimate_term_sizes(
         "g": float(moments @ values),
         "c": float(moments @ values),
         "M": float(inertias @ values),
+        "p": float(inertias @ values) * speed,
+        "beta": bend,
         "C": float(inertias @ values) * speed,
         "tau_by_q": bend,
         "tau_by_dq": float(inertias @ values) * speed,
@@ -89,7 +91,7 @@ def find_entry_sizes(name: str, expected: FloatArray, least: float) -> FloatArra
     Returns:
         An array that broadcasts to one state of the result.
     """
-    if name in ("tau", "delta", "g", "c"):
+    if name in ("tau", "delta", "g", "c", "p", "beta"):
         return np.maximum(np.abs(expected).max(axis=0), least)
     if name == "M":
         diagonal = np.sqrt(np.abs(np.diagonal(expected, axis1=1, axis2=2)).max(axis=0))

@@ -1,4 +1,4 @@
-"""Derivatives of values in a graph, by forward accumulation."""
+"""Derivatives of values in a graph, by forward and by reverse accumulation."""
 
 from collections.abc import Callable, Sequence
 
@@ -38,6 +38,52 @@ def differentiate(graph: Graph, outputs: Sequence[int], position: int) -> list[i
     return [get_derivative(value) for value in outputs]
 
 
+def find_gradient(graph: Graph, output: int) -> dict[int, int]:
+    """Return the references to the derivatives of one output by all inputs, by the inputs' positions; derivatives of jumps
+    are zero.
+
+    Args:
+        graph: Graph of the output, which derivatives are added to.
+        output: Reference to the output.
+
+    Returns:
+        Only inputs with a derivative that is not zero throughout.
+
+    Raises:
+        NotImplementedError: The output depends on an input through a function without a rule.
+    """
+    adjoints = {output >> 1: graph.constant(-1.0 if output & 1 else 1.0)}
+    gradient: dict[int, int] = {}
+    for number in reversed(list(graph.find_reached([output]))):
+        adjoint = adjoints.pop(number, ZERO)
+        operation, operands, size = graph.nodes[number]
+        if adjoint == ZERO or operation == "constant":
+            continue
+        if operation == "input":
+            gradient[int(size)] = adjoint
+            continue
+        for k, value in enumerate(operands):
+            slope = _find_slope(graph, operation, operands, k, 2 * number)
+            part = graph.multiply(adjoint, slope)
+            part = graph.negate(part) if value & 1 else part
+            adjoints[value >> 1] = graph.add(adjoints.get(value >> 1, ZERO), part)
+    return gradient
+
+
+def _find_slope(graph: Graph, operation: str, operands: Sequence[int], k: int, result: int) -> int:
+    """Return the derivative of a node by its operand k."""
+    if operation == "+":
+        return graph.constant(1.0)
+    if operation == "neg":
+        return graph.constant(-1.0)
+    if operation == "*":
+        return operands[1 - k]
+    if operation == "/":
+        inverse = graph.call("inv", operands[1])
+        return inverse if k == 0 else graph.negate(graph.multiply(result, inverse))
+    return _get_rule(operation)(graph, operands[0], result)
+
+
 def _differentiate_node(
     graph: Graph, operation: str, operands: Sequence[int], moved: Sequence[int], result: int
 ) -> int:
@@ -52,9 +98,18 @@ def _differentiate_node(
     if operation == "/":
         (_, b), (da, db) = operands, moved
         return graph.call("/", graph.subtract(da, graph.multiply(result, db)), b)
+    return graph.multiply(_get_rule(operation)(graph, operands[0], result), moved[0])
+
+
+def _get_rule(operation: str) -> Rule:
+    """Return the rule for a function of one value.
+
+    Raises:
+        NotImplementedError: There is no rule.
+    """
     if operation not in _SLOPES:
         raise NotImplementedError(f"there is no derivative of {operation}")
-    return graph.multiply(_SLOPES[operation](graph, operands[0], result), moved[0])
+    return _SLOPES[operation]
 
 
 def _subtract_square(graph: Graph, value: int) -> int:

@@ -1,12 +1,12 @@
 """Parts of the dynamics, and functions derived from them, ready for export."""
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from paramreduce_cli.errors import DataError
-from paramreduce_cli.expressions.derivatives import differentiate
+from paramreduce_cli.expressions.derivatives import differentiate, find_gradient
 from paramreduce_cli.expressions.factoring import Values, minimise_operations
 from paramreduce_cli.expressions.functions import Argument, Function
 from paramreduce_cli.expressions.graph import ZERO, Graph
@@ -42,10 +42,14 @@ class DynamicsParts(LeanFunctions):
         """Return the function that gives Coriolis and centrifugal torques."""
         c = Argument("c", (self._mechanism.n_dof,), "Coriolis and centrifugal torques, N m or N")
         text = "Coriolis and centrifugal torques C dz, without gravity, springs and friction."
-        weightless = replace(self._mechanism, gravity=np.zeros(3))
-        models = LeanModels(replace(self._model, mechanism=weightless), independent=True)
+        models = self._make_weightless()
         inertial = self._reduced.drop_unaffecting(find_inertial_parameters(self._mechanism))
         return self._make_part("coriolis", text, c, models, inertial, set(), direct=True)
+
+    def _make_weightless(self) -> LeanModels:
+        """Return lean models without gravity."""
+        mechanism = replace(self._mechanism, gravity=np.zeros(3))
+        return LeanModels(replace(self._model, mechanism=mechanism), independent=True)
 
     def make_mass_matrix(self) -> Function:
         """Return the function that gives the mass matrix."""
@@ -69,9 +73,9 @@ class DynamicsParts(LeanFunctions):
         c = self.make_coriolis()
         graph, outputs = c.program.to_graph()
         speeds = self._list_positions(c, "dq")
-        columns = [differentiate(graph, outputs, position) for position in speeds]
         half = graph.constant(0.5)
-        entries = [graph.multiply(half, columns[j][i]) for i in range(z) for j in range(z)]
+        rows = _differentiate_forward(graph, outputs, speeds)
+        entries = [graph.multiply(half, entry) for row in rows for entry in row]
         return self._rewrite_like(c, "coriolis_matrix", text, (C,), graph, entries)
 
     def make_derivatives(self) -> Function:
@@ -86,15 +90,64 @@ class DynamicsParts(LeanFunctions):
         by_dq = Argument("tau_by_dq", (z, z), "derivatives of the torques by the velocities")
         text = "Derivatives of the inverse dynamics; those by the accelerations are the mass matrix. At a jump of friction they are those beside it."
         inverse = self.make_inverse()
-        graph, outputs = inverse.program.to_graph()
-        entries = []
-        for name in ("q", "dq"):
-            positions = self._list_positions(inverse, name)
-            columns = [differentiate(graph, outputs, position) for position in positions]
-            entries += [columns[j][i] for i in range(z) for j in range(z)]
-        return self._rewrite_like(
-            inverse, "inverse_dynamics_derivatives", text, (by_q, by_dq), graph, entries
-        )
+        sides = [self._list_positions(inverse, name) for name in ("q", "dq")]
+        candidates = []
+        for find_jacobian in (_differentiate_forward, _differentiate_backward):
+            graph, outputs = inverse.program.to_graph()
+            rows = [row for inputs in sides for row in find_jacobian(graph, outputs, inputs)]
+            values = Values(graph, [entry for row in rows for entry in row])
+            candidates.append(Program.from_graph(*minimise_operations([values])))
+        program = min(candidates, key=lambda candidate: candidate.n_operations)
+        name = "inverse_dynamics_derivatives"
+        return Function(name, text, inverse.arguments, (by_q, by_dq), program)
+
+    def make_momentum(self) -> Function:
+        """Return the function that gives the momentum and its rate without torques.
+
+        With p = M dq and the kinetic energy T, the rate is dT/dq less gravity, springs and friction.
+
+        Raises:
+            DataError: The mechanism has closed loops.
+        """
+        self._require_tree("the momentum")
+        z, models = self._mechanism.n_dof, self._models
+        p = Argument("p", (z,), "momentum M dq, N m s or N s")
+        beta = Argument("beta", (z,), "rate of the momentum without torques, N m or N")
+        text = "Momentum p, and beta with dp/dt = tau + beta under torques tau."
+        dq, ddq = self._list_inputs("dq"), self._list_inputs("ddq")
+        is_inertial = find_inertial_parameters(self._mechanism)
+        inertial = self._reduced.drop_unaffecting(is_inertial)
+        drives = self._reduced.drop_unaffecting(~is_inertial)
+        graph, every = Graph(), slice(None)
+
+        def add(
+            models: LeanModels,
+            reduced: ReducedModel,
+            zero: Collection[int],
+            moved: Mapping[int, int],
+        ) -> list[int]:
+            """Add the torques of some parameters to the graph, with some inputs zero and others taken for each other."""
+            program = models.build_part(
+                reduced, direct=False, outputs=every, zero=set(zero), constant=self._constant
+            )
+            return self._insert(graph, program, moved)
+
+        # Without velocities and gravity, accelerations dq take the torques M dq.
+        momentum = add(self._make_weightless(), inertial, dq, dict(zip(ddq, dq, strict=True)))
+        gravity = add(models, inertial, {*dq, *ddq}, {})
+        losses = add(models, drives, ddq, {})
+        n_phi = self._reduced.n
+        n = self._mechanism.n_q
+        energy = ZERO
+        for k, value in enumerate(momentum):
+            energy = graph.add(energy, graph.multiply(value, graph.input(n_phi + n + k)))
+        gradient = find_gradient(graph, graph.multiply(graph.constant(0.5), energy))
+        rates = []
+        for k in range(z):
+            others = graph.add(gravity[k], losses[k])
+            rates.append(graph.subtract(gradient.get(n_phi + k, ZERO), others))
+        graph, outputs = minimise_operations([Values(graph, [*momentum, *rates])])
+        return self._make_function("momentum", text, (p, beta), graph, outputs)
 
     def make_forward_dynamics(self) -> Function:
         """Return the function that gives the accelerations of the independent coordinates under given torques."""
@@ -183,6 +236,22 @@ class DynamicsParts(LeanFunctions):
         n, start = self._mechanism.n_q, self._models.n_parameters
         place = ("q", "dq", "ddq").index(name)
         return range(start + place * n, start + (place + 1) * n)
+
+
+def _differentiate_forward(
+    graph: Graph, outputs: Sequence[int], inputs: Sequence[int]
+) -> list[list[int]]:
+    """Return the rows of the Jacobian of outputs by inputs, column by column."""
+    columns = [differentiate(graph, outputs, position) for position in inputs]
+    return [list(row) for row in zip(*columns, strict=True)]
+
+
+def _differentiate_backward(
+    graph: Graph, outputs: Sequence[int], inputs: Sequence[int]
+) -> list[list[int]]:
+    """Return the rows of the Jacobian of outputs by inputs, row by row."""
+    gradients = [find_gradient(graph, output) for output in outputs]
+    return [[gradient.get(position, ZERO) for position in inputs] for gradient in gradients]
 
 
 def find_inertial_parameters(mechanism: Mechanism) -> BoolArray:

@@ -1,6 +1,6 @@
 """The functions that a model consists of, for a set of parameters, ready for export."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import casadi as ca
 import numpy as np
@@ -110,15 +110,29 @@ class LeanFunctions:
 
     def _renumber(self, program: Program) -> tuple[Graph, list[int]]:
         """Return the outputs of a program of lean models in a graph whose inputs are the kept parameters, then the others."""
-        start, n, place = self._models.n_parameters, self._reduced.n, self._reduced.position
         graph = Graph()
+        return graph, self._insert(graph, program)
+
+    def _insert(
+        self, graph: Graph, program: Program, replaced: Mapping[int, int] | None = None
+    ) -> list[int]:
+        """Add a program of lean models to a graph whose inputs are the kept parameters, then the others, and return its
+        outputs.
+
+        Args:
+            graph: Graph that the program is added to.
+            program: Program with the inputs of lean models.
+            replaced: Positions of inputs of lean models, by the positions of those that they are used for.
+        """
+        start, n, place = self._models.n_parameters, self._reduced.n, self._reduced.position
 
         def substitute(position: int) -> int:
             """Return the input of a kept parameter by its position in the model, or another input behind these."""
+            position = (replaced or {}).get(position, position)
             kept = position - start + n if position >= start else int(place[position])
             return graph.input(kept)
 
-        return graph, program.rebuild(graph, substitute)
+        return program.rebuild(graph, substitute)
 
     def _build_pruned_program(
         self, simplified: TermModel, project: Callable[..., list[int]]
@@ -154,6 +168,7 @@ class LeanFunctions:
             "nonlinear_effects": {"phi", "q", "dq", "R", "b"},
             "coriolis": {"phi", "q", "dq", "R", "b"},
             "mass_matrix": {"phi", "q", "R"},
+            "momentum": {"phi", "q", "dq"},
             "gravity": {"phi", "q", "R"},
             "regressor": {"q", "dq", "ddq", "R"},
         }[name]

@@ -24,7 +24,7 @@ from paramreduce_cli.expressions.graph import Graph
 from paramreduce_cli.expressions.programs import Program
 from paramreduce_cli.records import ModelErrors, TermModel
 
-OF_OPEN_TREES = {Exported.CORIOLIS_MATRIX, Exported.DERIVATIVES}
+OF_OPEN_TREES = {Exported.CORIOLIS_MATRIX, Exported.MOMENTUM, Exported.DERIVATIVES}
 """Functions that mechanisms with loops are refused with a message; `test_parts.py` sees to that."""
 needs_gcc = pytest.mark.skipif(shutil.which("gcc") is None, reason="gcc is not installed")
 needs_octave = pytest.mark.skipif(shutil.which("octave-cli") is None, reason="needs Octave")

@@ -1,5 +1,6 @@
 """Parts of the dynamics: gravity, Coriolis torques, bias and mass matrix, against Pinocchio and in their languages."""
 
+import dataclasses
 import shutil
 import subprocess
 
@@ -144,6 +145,40 @@ def test_forward_dynamics_undo_the_inverse(robot):
     got = np.column_stack([np.broadcast_to(x, count) for x in function.program.evaluate(inputs)])
     expected = cases[function.results[0].name]
     np.testing.assert_allclose(got, expected, rtol=0, atol=1e-9 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize("robot", ["puma560", "ur5e"])
+def test_momentum_and_its_rate_are_those_of_pinocchio(robot):
+    model = model_of(robot)
+    friction = [p.kind.key != "" for p in model.mechanism.parameters]
+    model = dataclasses.replace(model, values=np.where(friction, 0.0, model.values))
+    chosen = make_full_model(model)
+    exported = make_exported_model(model, chosen, title="parts", what=Exported.MOMENTUM)
+    (function,) = exported.functions
+    n = model.mechanism.n_q
+    q, dq = np.random.default_rng(6).uniform(-2, 2, (2, 20, n))
+    given = {"phi": np.tile(chosen.values, (len(q), 1)), "q": q, "dq": dq}
+    inputs = [column for a in function.arguments for column in given[a.name].T]
+    columns = [np.broadcast_to(x, len(q)) for x in function.program.evaluate(inputs)]
+    found = np.column_stack(columns)
+    built, data, offsets = pinocchio_model.build(model.mechanism, model.values)
+    for k in range(len(q)):
+        M = pin.crba(built, data, q[k] + offsets)
+        M = np.triu(M) + np.triu(M, 1).T
+        p = M @ dq[k]
+        C = pin.computeCoriolisMatrix(built, data, q[k] + offsets, dq[k])
+        rate = C.T @ dq[k] - pin.computeGeneralizedGravity(built, data, q[k] + offsets)
+        np.testing.assert_allclose(found[k, :n], p, rtol=0, atol=1e-11 * np.abs(p).max())
+        np.testing.assert_allclose(found[k, n:], rate, rtol=0, atol=1e-11 * np.abs(rate).max())
+
+
+def test_momentum_costs_less_than_its_parts():
+    model = model_of("puma560")
+    counts = {}
+    for what in (Exported.MOMENTUM, Exported.MASS_MATRIX, Exported.CORIOLIS_MATRIX):
+        exported = make_exported_model(model, make_base_model(model), title="parts", what=what)
+        counts[what] = exported.functions[0].program.n_operations
+    assert counts.pop(Exported.MOMENTUM) < sum(counts.values()) / 2
 
 
 def test_loops_have_no_derivatives():

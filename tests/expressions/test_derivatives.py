@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from paramreduce_cli.expressions.derivatives import differentiate
+from paramreduce_cli.expressions.derivatives import differentiate, find_gradient
 from paramreduce_cli.expressions.graph import Graph
 from paramreduce_cli.expressions.programs import Program
 
@@ -45,6 +45,17 @@ def test_derivatives_are_those_of_differences(position):
     assert found == pytest.approx((ends[0] - ends[1]) / (2 * STEP), rel=1e-7, abs=1e-9)
 
 
+def test_gradients_are_the_derivatives_by_each_input():
+    graph = Graph()
+    outputs = build(graph)
+    for k, output in enumerate(outputs):
+        gradient = find_gradient(graph, output)
+        for position in range(3):
+            (forward,) = differentiate(graph, [output], position)
+            pair = evaluate(graph, [gradient.get(position, 0), forward], INPUTS)
+            assert pair[0] == pytest.approx(pair[1], rel=1e-13), (k, position)
+
+
 def test_what_does_not_depend_on_an_input_has_no_derivative():
     graph = Graph()
     output = graph.call("sin", graph.input(0))
@@ -55,3 +66,5 @@ def test_functions_without_a_rule_are_refused():
     graph = Graph()
     with pytest.raises(NotImplementedError, match="atan"):
         differentiate(graph, [graph.call("atan", graph.input(0))], 0)
+    with pytest.raises(NotImplementedError, match="atan"):
+        find_gradient(graph, graph.call("atan", graph.input(0)))

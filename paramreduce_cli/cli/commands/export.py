@@ -62,7 +62,7 @@ _OF_A_ROBOT = (FULL, BASE, IDENTIFIED, CONSISTENT, *_OF_ONE)
 )  # fmt: skip
 @click.option(
     "--what", type=click.Choice([str(what) for what in Exported]), multiple=True, default=["both"], show_default=True,
-    help="Function to export; give it several times for several in one file: inverse dynamics (idm), direct dynamics [M | delta] (ddm), both, the regressor, or a part: torques at rest (gravity), Coriolis torques C dz, all torques without acceleration (nonlinear), M (mass-matrix), C in Christoffel form (coriolis-matrix), derivatives of the inverse dynamics (derivatives), accelerations (forward-dynamics).",
+    help="Function to export; give it several times for several in one file: inverse dynamics (idm), direct dynamics [M | delta] (ddm), both, the regressor, or a part: torques at rest (gravity), Coriolis torques C dz, all torques without acceleration (nonlinear), M (mass-matrix), C in Christoffel form (coriolis-matrix), momentum and its rate (momentum), derivatives of the inverse dynamics (derivatives), accelerations (forward-dynamics).",
 )  # fmt: skip
 @click.option(
     "--model",
