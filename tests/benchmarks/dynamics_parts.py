@@ -33,6 +33,7 @@ PARTS = {
     Exported.MASS_MATRIX: ("crba", lambda u, *links: u.get_inertia_matrix_crba(*links)),
     Exported.DDM: ("crba + nonLinearEffects", None),
     Exported.CORIOLIS_MATRIX: ("computeCoriolisMatrix", None),
+    Exported.MOMENTUM: ("", None),
     Exported.DERIVATIVES: ("computeRNEADerivatives", None),
     Exported.FORWARD_DYNAMICS: ("aba", lambda u, *links: u.get_forward_dynamics_crba(*links, gravity=GRAVITY)),
     Exported.REGRESSOR: ("computeJointTorqueRegressor", None),
