@@ -117,7 +117,7 @@ def _write_unit(model: ExportedModel, function: Function, name: str) -> bytes:
         "n_values": sum(v["size"] for v in shown),
         **model.list_coordinates(),
         "n_states": 2 * model.independent.size if simulated else 0,
-        "state": "z" if model.closures else "q",
+        "state": _name_motion(model)[0],
         "loops": bool(model.closures),
         "assembly": model.start.tolist(),
         "loop_arguments": _list_loop_arguments(variables),
@@ -138,51 +138,53 @@ def _write_unit(model: ExportedModel, function: Function, name: str) -> bytes:
 def _list_variables(
     model: ExportedModel, function: Function, *, simulated: bool
 ) -> list[_Variable]:
-    """Return the variables of a unit; those that loops determine are no inputs."""
-    loops = bool(model.closures)
-    prefix, n = ("z" if loops else "q"), model.independent.size
-    listed = ", ".join(model.coordinates[k] for k in model.independent)
-    taken = {a.name for a in function.arguments}
-    needed = {prefix}
-    if taken & {"dq", "ddq", "b"}:
-        needed.add(f"d{prefix}")
-    if "ddq" in taken:
-        needed.add(f"dd{prefix}")
-    values = tuple(p.value for p in model.parameters)
-    start = tuple(model.start[model.independent].tolist())
+    """Return the variables of a unit; coordinates that loops determine are no inputs."""
     variables = [_Variable("time", "time, s", causality="independent")]
-    if "phi" in taken:
-        names = ", ".join(p.name for p in model.parameters)
-        variables.append(
-            _Variable("phi", f"parameters: {names}", (len(values),), "parameter", "tunable", values)
-        )
-    texts = (f"coordinates, rad or m: {listed}", "their velocities", "their accelerations")
-    for order, text in enumerate(texts):
-        name = "d" * order + prefix
-        below = "d" * (order - 1) + prefix if order else ""
-        if simulated:
-            values = (start if order == 0 else (0.0,) * n) if order < 2 else ()
-            variables.append(
-                _Variable(name, text, (n,), values=values, derivative_of=below, state=order < 2)
-            )
-        elif name in needed:
-            values = start if order == 0 else (0.0,) * n
-            variables.append(_Variable(name, text, (n,), "input", values=values))
-    if simulated:
-        zero = (0.0,) * n
-        variables.append(
-            _Variable("tau", f"torques or forces, N m or N: {listed}", (n,), "input", values=zero)
-        )
-        text = "longest step of the Runge-Kutta method in a co-simulation, s"
-        variables.append(
-            _Variable("longest_step", text, (), "parameter", "tunable", (_LONGEST_STEP,))
-        )
-    else:
-        variables += [_Variable(a.name, a.text, a.shape) for a in function.results]
-    if loops:
+    if "phi" in {argument.name for argument in function.arguments}:
+        values = tuple(p.value for p in model.parameters)
+        text = f"parameters: {', '.join(p.name for p in model.parameters)}"
+        variables.append(_Variable("phi", text, (len(values),), "parameter", "tunable", values))
+    variables += _list_simulated(model) if simulated else _list_computed(model, function)
+    if model.closures:
         text = f"all coordinates: {', '.join(model.coordinates)}"
         variables.append(_Variable("q", text, (len(model.coordinates),)))
     return variables
+
+
+def _list_simulated(model: ExportedModel) -> list[_Variable]:
+    """Return the variables of a simulation: states, their derivatives, torques and the longest step."""
+    q, dq, ddq = _name_motion(model)
+    n = model.independent.size
+    start, zero = tuple(model.start[model.independent].tolist()), (0.0,) * n
+    listed = ", ".join(model.coordinates[k] for k in model.independent)
+    longest = "longest step of the Runge-Kutta method in a co-simulation, s"
+    return [
+        _Variable(q, f"coordinates, rad or m: {listed}", (n,), values=start, state=True),
+        _Variable(dq, "their velocities", (n,), values=zero, derivative_of=q, state=True),
+        _Variable(ddq, "their accelerations", (n,), derivative_of=dq),
+        _Variable("tau", f"torques or forces, N m or N: {listed}", (n,), "input", values=zero),
+        _Variable("longest_step", longest, (), "parameter", "tunable", (_LONGEST_STEP,)),
+    ]
+
+
+def _list_computed(model: ExportedModel, function: Function) -> list[_Variable]:
+    """Return the variables of a function: the independent coordinates and what it needs of their motion, and its results."""
+    q, dq, ddq = _name_motion(model)
+    n = model.independent.size
+    start, zero = tuple(model.start[model.independent].tolist()), (0.0,) * n
+    listed = ", ".join(model.coordinates[k] for k in model.independent)
+    taken = {argument.name for argument in function.arguments}
+    variables = [_Variable(q, f"coordinates, rad or m: {listed}", (n,), "input", values=start)]
+    if taken & {"dq", "ddq", "b"}:
+        variables.append(_Variable(dq, "their velocities", (n,), "input", values=zero))
+    if "ddq" in taken:
+        variables.append(_Variable(ddq, "their accelerations", (n,), "input", values=zero))
+    return variables + [_Variable(a.name, a.text, a.shape) for a in function.results]
+
+
+def _name_motion(model: ExportedModel) -> tuple[str, str, str]:
+    """Return the names of the independent coordinates, their velocities and their accelerations."""
+    return ("z", "dz", "ddz") if model.closures else ("q", "dq", "ddq")
 
 
 def _number_variables(variables: Sequence[_Variable]) -> list[dict[str, Any]]:
