@@ -32,6 +32,8 @@ class ArrayLibrary:
     """Function that makes the arrays of the self-test from lists."""
     decorator: str = ""
     """Decorator of the functions."""
+    conversion: str = ""
+    """Expression of the parameters in the precision of the states; empty if there is one precision."""
 
 
 def write_module(model: ExportedModel, library: ArrayLibrary) -> dict[str, bytes]:
@@ -59,6 +61,8 @@ def _write_function(function: Function, library: ArrayLibrary, *, private: bool)
     lines += _write_section("Returns", function.results)
     lines += ['    """']
     lines += [f"    {a.name} = _array({a.name!r}, {a.name}, {a.shape})" for a in function.arguments]
+    if library.conversion and "phi" in {a.name for a in function.arguments}:
+        lines.append(f"    phi = {library.conversion}")
     language = Language(library.calls, repr, lambda array, k: f"{array.name}[..., {_index(array, k)}]")  # fmt: skip
     steps, outputs = language.write_body(function)
     lines += [f"    {name} = {text}" for name, text in steps]

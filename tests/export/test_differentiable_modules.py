@@ -124,9 +124,10 @@ def test_single_precision_stays_single(library, tmp_path):
     rng = np.random.default_rng(0)
     double = [library.array(x) for x in rng.uniform(-2, 2, (3, 20, 6))]
     single = [library.array(x, single=True) for x in double]
-    phi = library.array(module.PHI, single=True)
-    got = module.inverse_dynamics(phi, *single)
+    got = module.inverse_dynamics(module.PHI, *single)
     assert "float32" in str(got.dtype)
+    one_state = module.direct_dynamics(module.PHI, single[0][0], single[1][0])
+    assert all("float32" in str(part.dtype) for part in one_state)
     expected = np.asarray(module.inverse_dynamics(module.PHI, *double))
     np.testing.assert_allclose(got, expected, rtol=0, atol=1e-4 * np.abs(expected).max())
 

@@ -12,7 +12,7 @@ _JAX = ArrayLibrary(
     notes=(
         "Functions are compiled by jax.jit at the first call for arrays of a shape, and differentiable by states and",
         "parameters. Arrays may have leading axes for many states; the last axis, or the last two of a matrix, are",
-        "those of one state. JAX computes in single precision unless jax_enable_x64 is set.",
+        "those of one state. The results have the precision of the states, which is single unless jax_enable_x64 is set.",
     ),
     test_imports=(
         "import jax",
@@ -23,6 +23,7 @@ _JAX = ArrayLibrary(
     ),
     test_array="jnp.array",
     decorator="@jax.jit",
+    conversion="phi.astype(q.dtype)",
 )
 
 

@@ -16,6 +16,7 @@ _TORCH = ArrayLibrary(
     ),
     test_imports=("import numpy as np", "import torch"),
     test_array="torch.DoubleTensor",
+    conversion="phi.to(q)",
 )
 
 
