@@ -266,13 +266,15 @@ def code(
         validation: Validation, for the ranges of motion in the header.
 
     Raises:
-        KeyError: The language is unknown; the message lists all languages.
-        ValueError: There is no such function.
+        KeyError: The language or a function is unknown; the message lists all.
         ParamreduceError: The functions differ from textbook recursion.
     """
-    kinds = [Exported(kind) for kind in ([what] if isinstance(what, str) else what)]
+    kinds = [what] if isinstance(what, str) else list(what)
+    for kind in kinds:
+        if kind not in list(Exported):
+            raise KeyError(f"unknown function {kind!r}. Choose from: {', '.join(Exported)}")
     exported = make_exported_model(
-        model, parameters, title=title or f"{parameters.n} parameters", what=adapt_kinds(kinds, language), name=name,
+        model, parameters, title=title or f"{parameters.n} parameters", what=adapt_kinds([Exported(kind) for kind in kinds], language), name=name,
         constant=constant, single=single, origin="from Python", validation=validation,
     )  # fmt: skip
     files: dict[str, bytes] = languages[language](exported)

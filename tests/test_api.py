@@ -78,6 +78,20 @@ def test_unknown_names_are_answered_with_those_there_are(two_link_results):
         pr.chosen(results.reduction, "qr", 99)
     with pytest.raises(KeyError, match=r"unknown language 'fortran'\. Choose from: c, casadi"):
         pr.code(results.model, pr.base_model(results.model), "fortran")
+    with pytest.raises(KeyError, match="unknown function 'torques'. Choose from: idm, ddm, both"):
+        pr.code(results.model, pr.base_model(results.model), what="torques")
+
+
+def test_code_of_several_functions_has_a_name_of_its_own(two_link_results):
+    results = pr.open_results(two_link_results)
+    base = pr.base_model(results.model)
+    files = pr.code(results.model, base, "python", what=["gravity", "momentum"], name="arm")
+    assert set(files) == {"arm.py", "arm_test.py"}
+    text = files["arm.py"].decode()
+    assert text.index("def gravity(") < text.index("def momentum(")
+    assert list(pr.code(results.model, base, "fmu", what="ddm")) == [
+        "two_link_forward_dynamics.fmu"
+    ]
 
 
 def test_the_package_has_the_name_of_its_project():
