@@ -78,7 +78,7 @@ def test_unknown_names_are_answered_with_those_there_are(two_link_results):
         pr.chosen(results.reduction, "qr", 99)
     with pytest.raises(KeyError, match=r"unknown language 'fortran'\. Choose from: c, casadi"):
         pr.code(results.model, pr.base_model(results.model), "fortran")
-    with pytest.raises(KeyError, match="unknown function 'torques'. Choose from: idm, ddm, both"):
+    with pytest.raises(KeyError, match=r"unknown function 'torques'\. Choose from: idm, ddm, both"):
         pr.code(results.model, pr.base_model(results.model), what="torques")
 
 
