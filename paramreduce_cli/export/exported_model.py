@@ -99,6 +99,15 @@ _TAKEN = {
 }
 """Names of files and targets that exported code itself uses."""
 
+_RUST = {
+    "abstract", "alloc", "as", "async", "await", "become", "box", "break", "const", "continue",
+    "core", "crate", "do", "dyn", "else", "enum", "extern", "false", "final", "fn", "for", "gen",
+    "if", "impl", "in", "let", "loop", "macro", "match", "mod", "move", "mut", "override", "priv",
+    "proc_macro", "pub", "ref", "return", "self", "static", "std", "struct", "super", "test",
+    "trait", "true", "try", "type", "typeof", "union", "unsafe", "unsized", "use", "virtual",
+    "where", "while", "yield",
+}  # fmt: skip
+"""Words that no crate may be called."""
 _WIDTH = 100
 """Characters of a line of a header, at most, where its words allow."""
 _FIXED = "\N{NO-BREAK SPACE}"
@@ -115,7 +124,7 @@ _FITTED = (
 def make_identifier(name: str) -> str:
     """Return a name for files, for Python's module and as the prefix of names in code."""
     word = re.sub(r"[^A-Za-z0-9_]", "_", name)
-    reserved = keyword.iskeyword(word) or word in _TAKEN | sys.stdlib_module_names
+    reserved = keyword.iskeyword(word) or word in _TAKEN | _RUST | sys.stdlib_module_names
     return word if re.match(r"[A-Za-z]", word) and not reserved else f"robot_{word}"
 
 

@@ -377,6 +377,8 @@ def test_names_cannot_reach_the_code():
     assert make_identifier("m") == "robot_m"  # a library that exported code links
     assert make_identifier("6-axis.arm") == "robot_6_axis_arm"
     assert make_identifier("puma560") == "puma560"
+    for taken in ("match", "core", "torch", "jax", "class", "math"):
+        assert make_identifier(taken) == f"robot_{taken}"
     assert make_harmless('a */ int x; /* "\\" \n') == "a * / int x; / * '/'  "
 
 
