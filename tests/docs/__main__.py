@@ -33,7 +33,7 @@ NOTEBOOK = "tutorial.ipynb"
 _BLOCK = re.compile(
     r"(?:`(?P<file>[\w.]+\.(?:py|[ch]pp|m))`:\n\n)?```(?P<kind>\w*)\n(?P<text>.*?)```", re.DOTALL
 )
-_COMMAND = re.compile(r"paramreduce |for |cp |python |make -C |cc |g\+\+ |octave-cli |\./")
+_COMMAND = re.compile(r"paramreduce |for |cp |python |make -C |cc |g\+\+ |octave-cli |cargo |\./")
 """Lines that are typed; other targets of Make are those of the repository, and CI's."""
 
 
