@@ -201,7 +201,7 @@ def _check_mass_matrices(
     if Exported.FORWARD_DYNAMICS in kinds and massless:
         raise DataError(
             f"{Exported.FORWARD_DYNAMICS}: {', '.join(massless)} moves no mass, so that forces determine no acceleration there. "
-            f"Export {Exported.IDM}, or {Exported.DDM} in a language other than fmu, and solve for the other accelerations."
+            f"Export {Exported.IDM}; languages other than fmu also have {Exported.DDM}, for the other accelerations."
         )
     if Exported.FORWARD_DYNAMICS in kinds and unsafe:
         raise DataError(

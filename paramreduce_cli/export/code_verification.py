@@ -114,10 +114,11 @@ def _evaluate_pruned(
     if "b" in stored and not simplified.projected:
         drift = stored["ddq"] - np.einsum("kij,kj->ki", across, stored["ddz"])
         delta = delta + np.einsum("kij,kj->ki", M, drift)
-    return {
-        "M": np.einsum("kia,kij,kjb->kab", across, M, across),
-        "delta": np.einsum("kij,ki->kj", across, delta),
-    }
+    M = np.einsum("kia,kij,kjb->kab", across, M, across)
+    delta = np.einsum("kij,ki->kj", across, delta)
+    # Under these torques the pruned function has the stored accelerations.
+    tau = np.einsum("kij,kj->ki", M, stored.get("ddz", stored["ddq"])) + delta
+    return {"M": M, "delta": delta, "tau": tau}
 
 
 def check(

@@ -84,9 +84,23 @@ class ExportedModel:
 
 
 _TAKEN = {
+    "fsspec",
     "jax",
+    "jaxlib",
+    "jinja2",
+    "ml_dtypes",
+    "mpmath",
+    "networkx",
     "numpy",
+    "opt_einsum",
+    "scipy",
+    "sympy",
     "torch",
+    "typing_extensions",
+    "ALL",
+    "INTERFACE",
+    "PRIVATE",
+    "PUBLIC",
     "all",
     "clean",
     "edit_cache",
@@ -97,9 +111,10 @@ _TAKEN = {
     "rebuild_cache",
     "test",
 }
-"""Names of files and targets that exported code itself uses."""
+"""Names of modules, files and targets that exported code itself uses, and words of CMake."""
 
 _RUST = {
+    "Self",
     "abstract", "alloc", "as", "async", "await", "become", "box", "break", "const", "continue",
     "core", "crate", "do", "dyn", "else", "enum", "extern", "false", "final", "fn", "for", "gen",
     "if", "impl", "in", "let", "loop", "macro", "match", "mod", "move", "mut", "override", "priv",

@@ -74,7 +74,7 @@ MOVES = [
      "Next: paramreduce export configs/two_link.yaml --results done --model best-subset:4"),
     (["export", "configs/two_link.yaml", "--lang", "matlab"],
      "Next: paramreduce export configs/two_link.yaml --format matlab"),
-    (["export", "configs/two_link.yaml", "--results", "done", "--model", "terms"], "Give one: --what idm"),
+    (["export", "configs/two_link.yaml", "--results", "done", "--model", "terms"], "such as terms: {torque_error: 0.01}"),
     (["export", "configs/two_link.yaml", "--results", "done", "--format", "urdf"],
      "`paramreduce init ROBOT.urdf` writes"),
     (["export", "configs/two_link.yaml", "--results", "done", "--set", "selected.n=3"],

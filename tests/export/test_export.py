@@ -420,6 +420,7 @@ def test_several_functions_come_in_one_file_under_a_name(invoke, two_link_result
     [
         (["--model", "swap:99"], "--model swap:99: there is full, base, "),
         (["--model", "nobody"], "--model nobody: there is full"),
+        (["--name", "a" * 61], "--name is too long. Give at most 60 characters"),
         (["--single", "--format", "python"], "--single needs --format c or --format rust"),
         (["--results", "nowhere"], "nowhere/model.h5"),
         (["--set", "description.gravity=[0,0,-1]"], "was made with another description section"),

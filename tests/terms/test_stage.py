@@ -4,6 +4,7 @@ import ctypes
 import itertools
 import json
 import shutil
+import subprocess
 import sys
 from functools import cache
 
@@ -534,6 +535,21 @@ def test_summary_and_page(two_link, tmp_path, invoke):
     assert f"{term.worst_state[0, 1]:.4g}" in differences
     assert f"{term.lower[1, 1]:.4g} to {term.upper[1, 1]:.4g}" in page
     assert (path.parent / "figures" / "terms.svg").exists()
+
+
+def test_accelerations_of_pruned_functions_are_exported(two_link, tmp_path, invoke):
+    """Units of FMI simulate the pruned mass matrix and bias; Python's self-test compares with their accelerations."""
+    shutil.copytree(two_link.store.folder, tmp_path / "r")
+    common = ("export", "configs/two_link.yaml", "--results", tmp_path / "r", "--model", "terms")
+    sets = [part for setting in (ONE_FORMAT, *TERMS) for part in ("--set", setting)]
+    out = tmp_path / "out"
+    invoke(*common, *sets, "--what", "ddm", "--format", "fmu", "--output", tmp_path / "units")
+    invoke(*common, *sets, "--what", "forward-dynamics", "--format", "python", "--output", out)
+    assert (tmp_path / "units" / "two_link_forward_dynamics.fmu").exists()
+    test = [sys.executable, "two_link_test.py"]
+    done = subprocess.run(test, cwd=out, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout
+    assert "forward_dynamics" in done.stdout
 
 
 def test_measured_torques_are_fitted_and_what_is_held_out_is_not_looked_at(measured_copy):

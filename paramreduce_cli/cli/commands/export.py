@@ -40,10 +40,16 @@ from paramreduce_cli.records import (
 )
 from paramreduce_cli.reduction.models import find_closest_standard
 
-_FUNCTIONS = {str(Exported.IDM): "inverse", str(Exported.DDM): "direct"}
-"""What one function alone is called."""
+_FUNCTIONS = {
+    str(Exported.IDM): "inverse",
+    str(Exported.DDM): "direct",
+    str(Exported.FORWARD_DYNAMICS): "direct",
+}
+"""Functions that have pruned terms, by what is exported of them."""
 LEANEST = "leanest"
 """The model of whichever function is asked for that has it with the fewest operations."""
+_LONGEST_NAME = 60
+"""Characters of a name, at most."""
 _WITH_PRECISION = ("c", "rust")
 """Languages whose code has a precision of its own."""
 _OF_ONE = (TERMS, LEANEST)
@@ -118,6 +124,13 @@ def export(
         raise click.UsageError(
             f"--model {text}: these values are valid for one function only, not for a robot's file. "
             f"Write code, or use --format {VALUES}."
+        )
+    if len(name) > _LONGEST_NAME:
+        raise click.UsageError(f"--name is too long. Give at most {_LONGEST_NAME} characters.")
+    if text == TERMS and loaded is not None and loaded.terms is None:
+        raise click.UsageError(
+            f"--model {TERMS}: the config has no terms section. Add one, such as terms: {{torque_error: 0.01}}, and run "
+            "reduce-terms."
         )
     single_function = _FUNCTIONS.get(what[0], "") if len(what) == 1 else ""
     if text in _OF_ONE and not single_function:
