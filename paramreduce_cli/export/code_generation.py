@@ -137,9 +137,11 @@ def make_exported_model(
     result_names = {result.name for function in functions for result in function.results}
     checked = make_random_cases(mechanism, chosen, _CHECKED, rng, simplified, result_names)
     least = estimate_term_sizes(mechanism, chosen, checked)
-    unsafe = (
-        _check_mass_matrices(model, checked, _list_kinds(what), title) if simplified is None else ""
-    )
+    kinds = _list_kinds(what)
+    if Exported.FORWARD_DYNAMICS in kinds:
+        _require_accelerations(model, checked)
+    # With pruned terms M was positive definite wherever these hold; the random states may be beyond.
+    unsafe = _check_mass_matrices(model, checked, kinds, title) if simplified is None else ""
     check(functions, checked, least)
     whole = np.array_equal(chosen.standard[model.affecting], model.values[model.affecting])
     if whole and simplified is None:
@@ -176,13 +178,32 @@ def make_exported_model(
     )
 
 
+def _require_accelerations(model: Model, stored: Mapping[str, FloatArray]) -> None:
+    """Raise DataError if forces do not determine all accelerations, whatever the parameters.
+
+    Raises:
+        DataError: Torques were not measured, or a coordinate moves no mass.
+    """
+    if model.unmeasured:
+        raise DataError(
+            f"{Exported.FORWARD_DYNAMICS}: the torques of {', '.join(model.unmeasured)} were not measured, so that the mass "
+            f"matrix is not known there. Export {Exported.IDM}."
+        )
+    massive = find_massive_coordinates(model, stored)
+    names = [model.mechanism.generalised_names[k] for k in model.mechanism.independent]
+    massless = [name for k, name in enumerate(names) if k not in massive]
+    if massless:
+        raise DataError(
+            f"{Exported.FORWARD_DYNAMICS}: no mass moves with {', '.join(massless)}, so that forces determine no acceleration "
+            f"there. Export {Exported.IDM}; languages other than fmu also have {Exported.DDM}, for the other accelerations."
+        )
+
+
 def _check_mass_matrices(
     model: Model, stored: Mapping[str, FloatArray], kinds: Sequence[Exported], title: str
 ) -> str:
     """Describe on how many states the mass matrix is not positive definite, and warn of them; empty if on none, or if no
     function needs it.
-
-    With pruned terms M was positive definite wherever these hold; random states may be beyond.
 
     Raises:
         DataError: Accelerations are asked for, which need a positive definite mass matrix.
@@ -190,23 +211,11 @@ def _check_mass_matrices(
     if not set(kinds) & set(_WITH_MASS_MATRIX):
         return ""
     massive = find_massive_coordinates(model, stored)
-    names = [model.mechanism.generalised_names[k] for k in model.mechanism.independent]
-    massless = [name for k, name in enumerate(names) if k not in massive]
-    if Exported.FORWARD_DYNAMICS in kinds and model.unmeasured:
-        raise DataError(
-            f"{Exported.FORWARD_DYNAMICS}: the torques of {', '.join(model.unmeasured)} were not measured, so that the mass "
-            f"matrix is not known there. Export {Exported.IDM}."
-        )
     unsafe = find_unsafe_mass_matrices(stored["M"][:, massive][:, :, massive])
-    if Exported.FORWARD_DYNAMICS in kinds and massless:
-        raise DataError(
-            f"{Exported.FORWARD_DYNAMICS}: {', '.join(massless)} moves no mass, so that forces determine no acceleration there. "
-            f"Export {Exported.IDM}; languages other than fmu also have {Exported.DDM}, for the other accelerations."
-        )
     if Exported.FORWARD_DYNAMICS in kinds and unsafe:
         raise DataError(
-            f"{Exported.FORWARD_DYNAMICS}: it needs a positive definite M, and of {title} {unsafe}. Choose a model that is selected by "
-            "accelerations, such as one of swap@acceleration, or full."
+            f"{Exported.FORWARD_DYNAMICS}: it needs a positive definite M, and of {title} {unsafe}. Choose a model that is "
+            "selected by accelerations, such as one of swap@acceleration, or full."
         )
     if unsafe:
         warnings.warn(f"{title}: {unsafe}", ParamreduceWarning, stacklevel=3)

@@ -76,7 +76,8 @@ class DynamicsParts(LeanFunctions):
         half = graph.constant(0.5)
         rows = _differentiate_forward(graph, outputs, speeds)
         entries = [graph.multiply(half, entry) for row in rows for entry in row]
-        return self._rewrite_like(c, "coriolis_matrix", text, (C,), graph, entries)
+        program = Program.from_graph(*minimise_operations([Values(graph, entries)]))
+        return Function("coriolis_matrix", text, c.arguments, (C,), program)
 
     def make_derivatives(self) -> Function:
         """Return the function that gives the derivatives of the torques by coordinates and velocities.
@@ -178,19 +179,6 @@ class DynamicsParts(LeanFunctions):
         """Return the positions of an argument among the inputs of a function."""
         positions = function.list_positions(function.arguments)
         return [k for k, (argument, _) in enumerate(positions) if argument.name == name]
-
-    @staticmethod
-    def _rewrite_like(
-        source: Function,
-        name: str,
-        text: str,
-        results: tuple[Argument, ...],
-        graph: Graph,
-        outputs: list[int],
-    ) -> Function:
-        """Return a function of the same arguments as another one, rewritten to few operations."""
-        program = Program.from_graph(*minimise_operations([Values(graph, outputs)]))
-        return Function(name, text, source.arguments, results, program)
 
     def _make_part(
         self,

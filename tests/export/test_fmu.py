@@ -195,7 +195,7 @@ def test_what_cannot_be_done_is_an_error_of_the_unit(tmp_path):
 
 @pytest.mark.parametrize("what", [Exported.FORWARD_DYNAMICS, Exported.BOTH, Exported.DDM])
 def test_massless_coordinates_are_not_simulated(tmp_path, what):
-    with pytest.raises(DataError, match="forward-dynamics: road moves no mass"):
+    with pytest.raises(DataError, match="forward-dynamics: no mass moves with road"):
         write_units(tmp_path, "wishbone", what)
 
 
